@@ -1,0 +1,87 @@
+// What the host and the shaders share. build.rs reads this file and makes Rust of it: each `struct` becomes a
+// #[repr(C)] struct, each `#define NAME number` a constant. Members are mat4, vec4 and uvec4 only, so that std140,
+// std430 and Rust lay them out alike; build.rs refuses anything else.
+
+// Compute group edge for image passes without shared memory, and group size for particle passes.
+#define IMAGE_GROUP 8
+#define PARTICLE_GROUP 64
+
+// Classes (Imai16 section 4.1) and sides: the layer of a two-layer map.
+#define CLASS_SPLASH 0
+#define CLASS_BODY 1
+#define SIDE_FRONT 0
+#define SIDE_BACK 1
+
+// Hit patterns (Imai16 section 4.4): which volume the view ray enters first and second.
+#define PATTERN_NONE 0
+#define PATTERN_SPLASH 1
+#define PATTERN_BODY 2
+#define PATTERN_SPLASH_SPLASH 3
+#define PATTERN_SPLASH_BODY 4
+#define PATTERN_BODY_SPLASH 5
+#define PATTERN_BODY_BODY 6
+
+// How a pixel's walk ended.
+#define OUTCOME_NO_LIQUID 0
+#define OUTCOME_HIT 1
+#define OUTCOME_LEFT_VIEW 2
+#define OUTCOME_HOLE 3
+#define OUTCOME_NOT_CONVERGED 4
+#define OUTCOME_REFLECTION_LIMIT 5
+
+// Which particles a class draws on which side; bits of the cull pass's verdict.
+#define VISIBLE_FRONT 1
+#define VISIBLE_BACK 2
+
+// Slots of the counter buffer: guards and culling, summed over the frame.
+#define COUNT_SPLASH_FRONT 0
+#define COUNT_SPLASH_BACK 1
+#define COUNT_BODY_FRONT 2
+#define COUNT_BODY_BACK 3
+#define COUNT_FIT_ZERO_NORMAL 4
+#define COUNT_FIT_GRAZING 5
+#define COUNT_FIT_UNBOUNDED 6
+#define COUNT_NORMAL_DEGENERATE 7
+#define COUNTERS 8
+
+// Plane fitting: below this |n.v| eq. (5) is not trusted; an update longer than this many sigma is not taken.
+#define FIT_GRAZING_LIMIT 0.01
+#define FIT_UPDATE_LIMIT 1.0
+
+// Search along a ray: secant steps, steps of a march, refinements of a bracket.
+#define SECANT_STEPS 10
+#define MARCH_STEPS 256
+#define REFINE_STEPS 24
+
+// One particle: eye-independent, as drawn.
+struct Particle {
+    vec4 center;         // xyz: world position
+    vec4 shape_diagonal; // xx, yy, zz of S = A A^T / r^2, A's columns the semi-axes
+    vec4 shape_mixed;    // xy, xz, yz of S
+};
+
+// One frame's parameters. Eye space looks down -z; d = -z is the linear depth; a view ray is v = (vx, vy, -1).
+struct Frame {
+    mat4 view;         // world to eye, rigid
+    mat4 eye_to_env;   // rotation from eye space to the environment map's space (+y up)
+    vec4 to_pixel;     // ax, ay, bx, by: pixel = a * v.xy + b
+    vec4 viewport;     // width, height in pixels; near plane; particle radius r
+    vec4 smoothing;    // sigma; largest update; grazing limit; unused
+    vec4 search;       // converged |f|; accepted |f|; largest depth spread that is interpolated; index of refraction
+    vec4 absorption;   // rgb coefficient per world unit; w unused
+    vec4 bounds_min;   // world box around everything drawn
+    vec4 bounds_max;
+    vec4 scene;        // host scene: P22, P23, cleared depth value; w: 1 if the eye is inside the body
+    uvec4 particles;   // splash count, body count, largest point size in pixels, 1 to draw quads only
+};
+
+// Indirect draws of one class: points, then quads (VkDrawIndirectCommand each).
+struct Draws {
+    uvec4 points; // vertices, instances, first vertex, first instance
+    uvec4 quads;
+};
+
+// Push constants of the particle passes.
+struct Splat {
+    uvec4 range; // first particle, count, class, side
+};

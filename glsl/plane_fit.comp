@@ -1,0 +1,99 @@
+// One iteration of plane fitting (Imai16 eqs. 2 to 5) on the front (layer 0) and back (layer 1) of the body.
+//
+// Everything is measured from the pixel's own point p_i: p_j - p_i = d_j (v_j - v_i) + (d_j - d_i) v_i, and eq. (5)
+// becomes d'_i = d_i + n.(mean p_j - p_i) / (n.v_i), in which nothing large cancels.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "shared.glsl"
+#include "frame.glsl"
+#include "normal.glsl"
+layout(local_size_x_id = 0, local_size_y_id = 1) in; // a square tile
+layout(constant_id = 2) const int REACH = 4; // window = 2 REACH + 1 pixels
+layout(constant_id = 3) const bool EUCLIDEAN = false; // weights of |p_i - p_j| instead of eq. (2)
+layout(set = 0, binding = 1) uniform texture2DArray depth_in;
+layout(set = 0, binding = 2) uniform utexture2DArray normal_raw;
+layout(set = 0, binding = 3, r32f) uniform writeonly image2DArray depth_out;
+layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
+
+const int TILE = int(gl_WorkGroupSize.x);
+const int EDGE = TILE + 2 * REACH;
+shared vec4 tile[EDGE * EDGE]; // raw normal, depth (0: no surface)
+shared uint occupied;
+
+void main() {
+    ivec2 size = ivec2(frame.viewport.xy);
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 origin = ivec2(gl_WorkGroupID.xy) * TILE - REACH;
+    int layer = int(gl_WorkGroupID.z);
+    if (gl_LocalInvocationIndex == 0u) occupied = 0u;
+    float own = 0.0; // negative (the eye is inside) and zero (nothing) pass through unchanged
+    if (all(lessThan(pixel, size))) own = texelFetch(depth_in, ivec3(pixel, layer), 0).x;
+    barrier();
+    if (own > 0.0) occupied = 1u;
+    barrier();
+    if (occupied == 0u) {
+        if (all(lessThan(pixel, size))) imageStore(depth_out, ivec3(pixel, layer), vec4(own));
+        return;
+    }
+    for (int k = int(gl_LocalInvocationIndex); k < EDGE * EDGE; k += TILE * TILE) {
+        ivec2 p = origin + ivec2(k % EDGE, k / EDGE);
+        vec4 entry = vec4(0.0);
+        if (all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, size))) {
+            float d = texelFetch(depth_in, ivec3(p, layer), 0).x;
+            if (d > 0.0) entry = vec4(decode_normal(texelFetch(normal_raw, ivec3(p, layer), 0).x), d);
+        }
+        tile[k] = entry;
+    }
+    barrier();
+    if (any(greaterThanEqual(pixel, size))) return;
+    if (own <= 0.0) {
+        imageStore(depth_out, ivec3(pixel, layer), vec4(own));
+        return;
+    }
+
+    vec3 v = view_ray(vec2(pixel) + 0.5);
+    vec2 step = 1.0 / frame.to_pixel.xy;
+    float inverse = 1.0 / (frame.smoothing.x * frame.smoothing.x);
+    ivec2 home = ivec2(gl_LocalInvocationID.xy) + REACH;
+    vec3 normal = vec3(0.0);
+    vec2 lateral = vec2(0.0); // sum of w d_j (v_j - v_i)
+    float along = 0.0;        // sum of w (d_j - d_i)
+    float total = 0.0;
+    for (int y = -REACH; y <= REACH; ++y) {
+        for (int x = -REACH; x <= REACH; ++x) {
+            vec4 entry = tile[(home.y + y) * EDGE + home.x + x];
+            if (entry.w <= 0.0) continue;
+            float rise = entry.w - own;
+            vec2 shift = entry.w * step * vec2(x, y);
+            float square = rise * rise;
+            if (EUCLIDEAN) {
+                vec3 apart = vec3(shift, 0.0) + rise * v;
+                square = dot(apart, apart);
+            }
+            float w = exp(-square * inverse);
+            normal += w * entry.xyz;
+            lateral += w * shift;
+            along += w * rise;
+            total += w;
+        }
+    }
+
+    float result = own;
+    float length_sum = length(normal);
+    if (length_sum < 1e-6 * total) {
+        atomicAdd(counters.at[COUNT_FIT_ZERO_NORMAL], 1u);
+    } else {
+        vec3 n = normal / length_sum;
+        float facing = dot(n, v);
+        float update = (dot(n.xy, lateral) + facing * along) / (facing * total);
+        if (abs(facing) < frame.smoothing.z * length(v)) {
+            atomicAdd(counters.at[COUNT_FIT_GRAZING], 1u);
+        } else if (!(abs(update) <= frame.smoothing.y) || own + update < frame.viewport.z) {
+            atomicAdd(counters.at[COUNT_FIT_UNBOUNDED], 1u);
+        } else {
+            result = own + update;
+        }
+    }
+    imageStore(depth_out, ivec3(pixel, layer), vec4(result));
+}

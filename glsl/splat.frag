@@ -1,0 +1,44 @@
+// The nearest front or farthest back of a class of particles: exact ray cast of each ellipsoid (Sigg06).
+//
+// With the pixel's ray v = vc + delta, a point at depth dc + s is q + s v from the centre, q = dc (delta, 0), and
+// (q + s v)^T G (q + s v) = 1 is quadratic in s with coefficients of order one.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.glsl"
+#include "frame.glsl"
+#include "normal.glsl"
+layout(push_constant) uniform PushBlock { Splat splat; };
+layout(location = 0) flat in vec3 center;
+layout(location = 1) flat in vec3 g_diagonal;
+layout(location = 2) flat in vec3 g_mixed;
+layout(location = 0) out float out_depth; // linear depth; negative where the near plane lies inside this particle
+layout(location = 1) out uint out_normal; // outward, eye space
+
+vec3 times_g(vec3 a) {
+    return vec3(g_diagonal.x * a.x + g_mixed.x * a.y + g_mixed.y * a.z,
+                g_mixed.x * a.x + g_diagonal.y * a.y + g_mixed.z * a.z,
+                g_mixed.y * a.x + g_mixed.z * a.y + g_diagonal.z * a.z);
+}
+
+void main() {
+    vec3 v = view_ray(gl_FragCoord.xy);
+    vec3 q = vec3(center.z * (v.xy - center.xy), 0.0);
+    vec3 gv = times_g(v), gq = times_g(q);
+    float a = dot(v, gv), b = dot(v, gq), c = dot(q, gq) - 1.0;
+    float discriminant = b * b - a * c;
+    if (discriminant < 0.0) discard;
+    float root = sqrt(discriminant), near = frame.viewport.z;
+    bool back = splat.range.w == SIDE_BACK;
+    float far_depth = center.z + (root - b) / a;
+    if (far_depth < near) discard;
+    float s = back ? (root - b) / a : (-root - b) / a;
+    float depth = center.z + s;
+    out_normal = encode_normal(normalize(times_g(q + s * v)));
+    out_depth = depth;
+    if (depth < near) {
+        // The ray starts inside this particle: nothing can be in front of that.
+        depth = near;
+        out_depth = -near;
+    }
+    gl_FragDepth = near / depth;
+}

@@ -1,0 +1,132 @@
+//! How passes touch resources, and the barriers that follow from it.
+
+use ash::vk::{self, AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};
+
+/// One way of using a resource: it fixes pipeline stage, memory access and image layout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Sampled (or storage-buffer) read in compute.
+    ComputeRead,
+    /// Storage write in compute; for images the whole content is replaced.
+    ComputeWrite,
+    /// Storage-buffer read and write (atomics) in compute.
+    ComputeReadWrite,
+    /// Storage-buffer read in a vertex shader.
+    VertexRead,
+    /// Sampled read in a fragment shader.
+    FragmentRead,
+    /// Colour attachment.
+    ColorAttachment,
+    /// Depth attachment, tested and written.
+    DepthAttachment,
+    /// Arguments of an indirect draw.
+    IndirectRead,
+    /// Source of a copy.
+    TransferRead,
+    /// Destination of a copy, fill or update.
+    TransferWrite,
+}
+
+impl Access {
+    /// Stage, access and layout (the layout is meaningless for buffers).
+    pub fn flags(self) -> (S, A, L) {
+        match self {
+            Access::ComputeRead => (S::COMPUTE_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL),
+            Access::ComputeWrite => (S::COMPUTE_SHADER, A::SHADER_WRITE, L::GENERAL),
+            Access::ComputeReadWrite => {
+                (S::COMPUTE_SHADER, A::from_raw(A::SHADER_READ.as_raw() | A::SHADER_WRITE.as_raw()), L::GENERAL)
+            }
+            Access::VertexRead => (S::VERTEX_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL),
+            Access::FragmentRead => (S::FRAGMENT_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL),
+            Access::ColorAttachment => (
+                S::COLOR_ATTACHMENT_OUTPUT,
+                A::from_raw(A::COLOR_ATTACHMENT_READ.as_raw() | A::COLOR_ATTACHMENT_WRITE.as_raw()),
+                L::COLOR_ATTACHMENT_OPTIMAL,
+            ),
+            Access::DepthAttachment => (
+                S::from_raw(S::EARLY_FRAGMENT_TESTS.as_raw() | S::LATE_FRAGMENT_TESTS.as_raw()),
+                A::from_raw(A::DEPTH_STENCIL_ATTACHMENT_READ.as_raw() | A::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw()),
+                L::DEPTH_ATTACHMENT_OPTIMAL,
+            ),
+            Access::IndirectRead => (S::DRAW_INDIRECT, A::INDIRECT_COMMAND_READ, L::UNDEFINED),
+            Access::TransferRead => (S::ALL_TRANSFER, A::TRANSFER_READ, L::TRANSFER_SRC_OPTIMAL),
+            Access::TransferWrite => (S::ALL_TRANSFER, A::TRANSFER_WRITE, L::TRANSFER_DST_OPTIMAL),
+        }
+    }
+
+    /// Whether this changes the resource.
+    pub fn writes(self) -> bool {
+        use Access::*;
+        matches!(self, ComputeWrite | ComputeReadWrite | ColorAttachment | DepthAttachment | TransferWrite)
+    }
+}
+
+/// What has happened to a resource so far: enough to say which barrier its next use needs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct State {
+    layout: L,
+    /// The last write that later uses have to wait for.
+    written: (S, A),
+    /// Stages that have read since.
+    read: S,
+    /// Stages and accesses to which the last write was already made visible.
+    visible: (S, A),
+}
+
+/// A barrier's four flags and two layouts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Barrier {
+    /// Before.
+    pub src: (S, A, L),
+    /// After.
+    pub dst: (S, A, L),
+}
+
+impl State {
+    /// The content no longer matters: the next use may start from an undefined layout. Execution order is kept.
+    pub fn discard(&mut self) {
+        self.layout = L::UNDEFINED;
+    }
+
+    /// Notes the next use; returns the barrier it needs before it, if any. `image`: whether layouts matter.
+    pub fn step(&mut self, access: Access, image: bool) -> Option<Barrier> {
+        let (stage, flags, layout) = access.flags();
+        let moved = image && self.layout != layout;
+        let before = self.layout;
+        if access.writes() || moved {
+            let (written, wrote) = self.written;
+            let src = (written | self.read, wrote, before);
+            self.layout = if image { layout } else { before };
+            // A layout transition is a write of its own, which this use's stage has already waited for.
+            self.written = (stage, if access.writes() { flags & WRITES } else { A::NONE });
+            self.visible = if access.writes() { (S::NONE, A::NONE) } else { (stage, flags) };
+            self.read = if access.writes() { S::NONE } else { stage };
+            let needed = moved || !src.0.is_empty();
+            return needed.then_some(Barrier { src, dst: (stage, flags, layout) });
+        }
+        self.read |= stage;
+        if self.written.0.is_empty() || (self.visible.0.contains(stage) && self.visible.1.contains(flags)) {
+            return None;
+        }
+        self.visible = (self.visible.0 | stage, self.visible.1 | flags);
+        Some(Barrier { src: (self.written.0, self.written.1, before), dst: (stage, flags, layout) })
+    }
+}
+
+const WRITES: A = A::from_raw(
+    A::SHADER_WRITE.as_raw()
+        | A::COLOR_ATTACHMENT_WRITE.as_raw()
+        | A::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw()
+        | A::TRANSFER_WRITE.as_raw(),
+);
+
+/// Every subresource of an image with this aspect.
+pub(crate) fn whole(aspect: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
+    vk::ImageSubresourceRange {
+        aspect_mask: aspect,
+        base_mip_level: 0,
+        level_count: vk::REMAINING_MIP_LEVELS,
+        base_array_layer: 0,
+        layer_count: vk::REMAINING_ARRAY_LAYERS,
+    }
+}

@@ -1,0 +1,33 @@
+//! What the codes in dumps and statistics mean.
+
+use meniscus::shader as s;
+
+pub const PATTERNS: &[(u32, &str)] = &[
+    (s::PATTERN_NONE, "no liquid"),
+    (s::PATTERN_SPLASH, "splash, no second volume"),
+    (s::PATTERN_BODY, "body, no second volume"),
+    (s::PATTERN_SPLASH_SPLASH, "splash, splash"),
+    (s::PATTERN_SPLASH_BODY, "splash, body"),
+    (s::PATTERN_BODY_SPLASH, "body, splash"),
+    (s::PATTERN_BODY_BODY, "body, body"),
+];
+
+pub const OUTCOMES: &[(u32, &str)] = &[
+    (s::OUTCOME_NO_LIQUID, "no liquid"),
+    (s::OUTCOME_HIT, "hit"),
+    (s::OUTCOME_LEFT_VIEW, "left the view"),
+    (s::OUTCOME_HOLE, "hole or depth jump"),
+    (s::OUTCOME_NOT_CONVERGED, "not converged"),
+    (s::OUTCOME_REFLECTION_LIMIT, "limit of internal reflections"),
+];
+
+pub const COUNTERS: &[(u32, &str)] = &[
+    (s::COUNT_SPLASH_FRONT, "splash_drawn_front"),
+    (s::COUNT_SPLASH_BACK, "splash_drawn_back"),
+    (s::COUNT_BODY_FRONT, "body_drawn_front"),
+    (s::COUNT_BODY_BACK, "body_drawn_back"),
+    (s::COUNT_FIT_ZERO_NORMAL, "plane_fit_zero_normal_sum"),
+    (s::COUNT_FIT_GRAZING, "plane_fit_grazing"),
+    (s::COUNT_FIT_UNBOUNDED, "plane_fit_update_too_long"),
+    (s::COUNT_NORMAL_DEGENERATE, "normals_lone_pixel"),
+];

@@ -1,0 +1,166 @@
+//! `--dump`: every intermediate target as .npy, so that any pass can be recomputed from the dump alone.
+
+use crate::{codes, render::Job, session::Session};
+use glam::{DMat4, DVec3, Mat4};
+use meniscus::{
+    Fresnel, Weighting,
+    io::images::write_file,
+    shader::{SIDE_BACK, SIDE_FRONT},
+    targets::Id,
+    twin::normal::decode_normal,
+};
+use npyz::WriterBuilder;
+use serde_json::json;
+use std::{collections::BTreeMap, error::Error, path::Path};
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let out = Folder { path: folder, size: job.size };
+    let needs = session.renderer.needs(&job.settings, true);
+    let smooth = (needs.body_depth(), needs.body_normal());
+    let targets = [
+        ("splash", "_raw", Id::SplashDepth, Id::SplashNormal),
+        ("body", "_raw", Id::BodyDepthRaw, Id::BodyNormalRaw),
+        ("body", "", smooth.0, smooth.1),
+    ];
+    for (class, raw, depth, normal) in targets {
+        for (side, layer) in [("front", SIDE_FRONT), ("back", SIDE_BACK)] {
+            let (Some(depths), Some(normals)) = (session.words(depth, layer)?, session.words(normal, layer)?) else {
+                continue;
+            };
+            out.maps(&format!("{class}_{side}"), raw, &depths, &normals)?;
+        }
+    }
+    let walk = floats(session.words(Id::Walk, 0)?);
+    for (k, name) in ["pattern", "outcome", "hits", "path_length"].into_iter().enumerate() {
+        out.array(name, 1, walk.chunks_exact(4).map(|w| w[k]))?;
+    }
+    let direction = floats(session.words(Id::Direction, 0)?);
+    out.array("final_direction", 3, direction.chunks_exact(4).flat_map(|d| [d[0], d[1], d[2]]))?;
+    out.array("color_linear", 3, session.picture()?.into_iter().flatten())?;
+    particles(&folder.join("particles.npz"), job)?;
+    write_file(&folder.join("frame.json"), serde_json::to_string_pretty(&frame(job))?.as_bytes())?;
+    Ok(())
+}
+
+fn floats(words: Option<Vec<u32>>) -> Vec<f32> {
+    words.unwrap_or_default().into_iter().map(f32::from_bits).collect()
+}
+
+struct Folder<'a> {
+    path: &'a Path,
+    size: [u32; 2],
+}
+
+impl Folder<'_> {
+    /// float32, H x W or H x W x `channels`, row 0 at the top.
+    fn array(&self, name: &str, channels: u64, data: impl Iterator<Item = f32>) -> Result<()> {
+        let (h, w) = (u64::from(self.size[1]), u64::from(self.size[0]));
+        let shape: &[u64] = if channels == 1 { &[h, w] } else { &[h, w, channels] };
+        write_file(&self.path.join(format!("{name}.npy")), &npy(shape, data)?)?;
+        Ok(())
+    }
+
+    fn maps(&self, surface: &str, raw: &str, depths: &[u32], normals: &[u32]) -> Result<()> {
+        let depth = |w: &u32| Some(f32::from_bits(*w)).filter(|d| *d > 0.0);
+        self.array(&format!("{surface}_depth{raw}"), 1, depths.iter().map(|w| depth(w).unwrap_or(f32::NAN)))?;
+        let normal = depths.iter().zip(normals).flat_map(|(d, n)| match depth(d) {
+            Some(_) => decode_normal(*n).to_array(),
+            None => [f32::NAN; 3],
+        });
+        self.array(&format!("{surface}_normal{raw}"), 3, normal)
+    }
+}
+
+fn npy<T: npyz::AutoSerialize>(shape: &[u64], data: impl Iterator<Item = T>) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut bytes).begin_nd()?;
+    writer.extend(data)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+fn particles(path: &Path, job: &Job) -> Result<()> {
+    let (p, origin) = (&job.scene.particles, job.scene.origin);
+    let n = p.ellipsoids.len() as u64;
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut npz = npyz::npz::NpzWriter::new(&mut bytes);
+    let mut add = |name: &str, shape: &[u64], data: Vec<f64>| -> Result<()> {
+        let mut w = npz.array(name, Default::default())?.default_dtype().shape(shape).begin_nd()?;
+        w.extend(data)?;
+        w.finish()?;
+        Ok(())
+    };
+    add("center", &[n, 3], p.ellipsoids.iter().flat_map(|e| (e.center.as_dvec3() + origin).to_array()).collect())?;
+    // Columns one after the other: each row of the array is one semi-axis vector.
+    add("axes", &[n, 3, 3], p.ellipsoids.iter().flat_map(|e| e.axes.as_dmat3().to_cols_array()).collect())?;
+    let mut w = npz.array("class", Default::default())?.default_dtype().shape(&[n]).begin_nd()?;
+    w.extend((0..p.ellipsoids.len()).map(|i| u8::from(i >= p.splash_count)))?;
+    w.finish()?;
+    drop(npz); // writes the archive's directory
+    write_file(path, bytes.get_ref())?;
+    Ok(())
+}
+
+/// 4 x 4, row-major, for column vectors.
+fn rows(m: DMat4) -> [[f64; 4]; 4] {
+    m.transpose().to_cols_array_2d()
+}
+
+/// The world-to-eye matrix in the file's coordinates.
+fn world_view(view: Mat4, origin: DVec3) -> DMat4 {
+    view.as_dmat4() * DMat4::from_translation(-origin)
+}
+
+/// All that is needed to recompute the dump.
+pub fn frame(job: &Job) -> serde_json::Value {
+    let (s, radius) = (&job.settings, job.scene.particles.radius);
+    let codes =
+        |table: &[(u32, &'static str)]| table.iter().map(|(c, t)| (c.to_string(), *t)).collect::<BTreeMap<_, _>>();
+    json!({
+        "width": job.size[0],
+        "height": job.size[1],
+        "view": rows(world_view(job.camera.view, job.scene.origin)),
+        "projection": rows(job.camera.projection.as_dmat4()),
+        "near": job.camera.near,
+        "eye": (job.eye.as_dvec3() + job.scene.origin).to_array(),
+        "eye_inside": job.eye_inside,
+        "origin": job.scene.origin.to_array(),
+        "radius": radius,
+        "window": s.window,
+        "iterations": s.iterations,
+        "sigma": s.sigma * radius,
+        "weighting": match s.weighting {
+            Weighting::ViewDependent => "view-dependent",
+            Weighting::Euclidean => "euclidean",
+        },
+        "plane_fit_guards": {
+            "grazing": meniscus::shader::FIT_GRAZING_LIMIT,
+            "update": meniscus::shader::FIT_UPDATE_LIMIT * s.sigma * radius,
+            "meaning": "the old depth is kept where |n.v| (v unit) is below `grazing` or the update exceeds `update`",
+        },
+        "refractions": s.refractions,
+        "internal_reflections": s.internal_reflections,
+        "fresnel": match s.fresnel {
+            Fresnel::Schlick => "schlick",
+            Fresnel::Exact => "exact",
+        },
+        "ior": s.ior,
+        "absorption": s.absorption.to_array(),
+        "sampling": {
+            "jump": meniscus::Camera::JUMP * radius,
+            "accepted": meniscus::Camera::ACCEPTED * radius,
+            "meaning": "maps are sampled bilinearly, normals with them, where all four pixels have a surface whose depths \
+                        spread by at most `jump`, else at the nearest pixel; a hit has |f| of at most `accepted`",
+        },
+        "pattern_codes": codes(codes::PATTERNS),
+        "outcome_codes": codes(codes::OUTCOMES),
+        "hits": "surfaces met on the walk, internal reflections included",
+        "path_length": "length inside the liquid, all intervals, world units",
+        "normals": "eye space, outward: fronts towards the viewer, backs away from it",
+        "particle_classes": {"0": "splash", "1": "body"},
+        "command": std::env::args().collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,123 @@
+//! From a particle file to particles as drawn.
+
+use glam::{DVec3, Mat3, Vec3};
+use indicatif::{ProgressBar, ProgressStyle};
+use meniscus::{
+    Class, Particles,
+    io::particles::{Invalid, check_finite, read},
+    prepare::{self, DensityField, Input, Options, Report},
+};
+use std::{error::Error, io::Write, path::Path, time::Duration};
+
+/// The dam break that is rendered when no file is named; see assets/README.md.
+const EMBEDDED: &[u8] = include_bytes!("../../../assets/dam_break.bgeo");
+const EMBEDDED_RADIUS: f64 = 0.025;
+
+/// Particles as drawn, and how they came to be.
+pub struct Scene {
+    pub particles: Particles,
+    pub report: Report,
+    /// Everything is drawn relative to this point of the file's coordinates, which keeps single precision precise.
+    pub origin: DVec3,
+    pub radius_source: &'static str,
+    pub dropped: usize,
+    pub prepare_ms: f64,
+    density: Option<DensityField>,
+}
+
+/// Which file, and how to read it.
+pub struct Source<'a> {
+    pub file: Option<&'a Path>,
+    pub radius: Option<f64>,
+    pub splash_threshold: Option<f32>,
+    pub drop_invalid: bool,
+}
+
+impl Scene {
+    pub fn load(source: &Source) -> Result<Scene, Box<dyn Error>> {
+        let bar = spinner("reading particles");
+        let embedded;
+        let path = match source.file {
+            Some(path) => path,
+            None => {
+                embedded = tempfile::Builder::new().suffix(".bgeo").tempfile()?;
+                embedded.as_file().write_all(EMBEDDED)?;
+                embedded.path()
+            }
+        };
+        let mut file = read(path)?;
+        let policy = if source.drop_invalid { Invalid::Drop } else { Invalid::Reject };
+        let dropped = check_finite(&mut file, policy, path)?;
+        bar.finish_and_clear();
+
+        let origin = origin(&file.positions);
+        let positions: Vec<Vec3> = file.positions.iter().map(|p| (*p - origin).as_vec3()).collect();
+        let (radius, radius_source) = match (source.radius, file.radius, source.file) {
+            (Some(r), _, _) => (r, "--radius"),
+            (None, _, None) => (EMBEDDED_RADIUS, "embedded scene"),
+            (None, Some(r), _) => (r, "file"),
+            (None, None, _) if positions.is_empty() => (1.0, "no particles"),
+            (None, None, _) => match prepare::estimate_radius(&positions) {
+                Some(r) => (f64::from(r), "estimated from spacing"),
+                None => {
+                    return Err(
+                        "the particle radius cannot be estimated from fewer than two places: give --radius".into()
+                    );
+                }
+            },
+        };
+        let classes: Option<Vec<Class>> = file
+            .classes
+            .as_ref()
+            .map(|c| c.iter().map(|c| if *c == 0 { Class::Splash } else { Class::Body }).collect());
+        let axes: Option<Vec<Mat3>> = file.axes.as_ref().map(|a| a.iter().map(|m| m.as_mat3()).collect());
+        let options = Options {
+            support: file.support.map(|s| s as f32),
+            splash_threshold: source.splash_threshold.unwrap_or(Options::default().splash_threshold),
+            ..Options::default()
+        };
+        let input = Input {
+            positions: &positions,
+            radius: radius as f32,
+            classes: classes.as_deref(),
+            ellipsoids: axes.as_deref(),
+        };
+        let bar = progress(positions.len() as u64, "classes and ellipsoids");
+        let start = std::time::Instant::now();
+        let (particles, report) =
+            prepare::prepare_with_progress(&input, &options, &|done| bar.set_position(done as u64))?;
+        let prepare_ms = start.elapsed().as_secs_f64() * 1e3;
+        bar.finish_and_clear();
+        let density =
+            if report.body > 0 { Some(DensityField::new(&positions, radius as f32, &options)?) } else { None };
+        Ok(Scene { particles, report, origin, radius_source, dropped, prepare_ms, density })
+    }
+
+    /// Whether a point (relative to the origin) is inside the body: half as dense as a filled body.
+    pub fn inside(&self, point: Vec3) -> bool {
+        self.density.as_ref().is_some_and(|d| d.relative_density(point) >= 0.5)
+    }
+}
+
+/// Zero, or the middle of a cloud that lies so far out that single precision would coarsen it.
+fn origin(positions: &[DVec3]) -> DVec3 {
+    let Some((low, high)) = positions.iter().map(|p| (*p, *p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
+        return DVec3::ZERO;
+    };
+    let middle = 0.5 * (low + high);
+    if middle.length() > 16.0 * (high - low).length() { middle.round() } else { DVec3::ZERO }
+}
+
+/// A bar that shows itself after a second, on a terminal.
+pub fn progress(length: u64, what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} {eta}").expect("a constant template");
+    let bar = ProgressBar::new(length).with_style(style).with_message(what);
+    bar.enable_steady_tick(Duration::from_secs(1));
+    bar
+}
+
+fn spinner(what: &'static str) -> ProgressBar {
+    let bar = ProgressBar::new_spinner().with_message(what);
+    bar.enable_steady_tick(Duration::from_secs(1));
+    bar
+}

@@ -1,0 +1,84 @@
+//! One renderer on one device: frames in, targets out.
+
+use ash::vk;
+use meniscus::{
+    Equirect, FrameInput, Renderer,
+    host::{Canvas, Gpu, HostError},
+    profile::FrameTimes,
+    targets::{Id, Spec},
+};
+
+/// Output format: linear float, so that one frame serves pictures, dumps and downsampling.
+const FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+
+pub struct Session<'a> {
+    pub gpu: &'a Gpu<'a>,
+    pub renderer: Renderer,
+    canvas: Canvas<'a>,
+    size: [u32; 2],
+}
+
+impl<'a> Session<'a> {
+    pub fn new(gpu: &'a Gpu<'a>, size: [u32; 2], environment: &Equirect) -> Result<Session<'a>, HostError> {
+        // SAFETY: `gpu` outlives the session, was made with the required features, and says whether it has large points.
+        let mut renderer = unsafe { Renderer::new(gpu.host(1), FORMAT) }?;
+        let ready = renderer.resize(size).map_err(HostError::from).and_then(|()| {
+            // SAFETY: `run` records outside rendering, and submits before any frame.
+            gpu.run(|cmd| Ok(unsafe { renderer.set_environment(cmd, environment) }?))?;
+            Canvas::new(gpu, FORMAT, 16, size)
+        });
+        match ready {
+            Ok(canvas) => Ok(Session { gpu, renderer, canvas, size }),
+            Err(e) => {
+                // SAFETY: `run` waits, so nothing is in flight.
+                unsafe { renderer.destroy() };
+                Err(e)
+            }
+        }
+    }
+
+    /// Renders one frame and waits for it.
+    pub fn frame(&mut self, input: &FrameInput) -> Result<Option<FrameTimes>, HostError> {
+        let input = FrameInput { output: self.canvas.view, ..*input };
+        let (renderer, canvas) = (&mut self.renderer, &self.canvas);
+        self.gpu.run(|cmd| {
+            canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+            // SAFETY: `cmd` is recording outside rendering; `run` waits, so slot 0 is free; the output was just
+            // brought into the stated layout.
+            Ok(unsafe { renderer.record(cmd, &input) }?)
+        })?;
+        Ok(self.renderer.times(input.slot))
+    }
+
+    /// The picture as last rendered: linear RGB, row by row.
+    pub fn picture(&self) -> Result<Vec<[f32; 3]>, HostError> {
+        Ok(floats(&self.canvas.read()?).chunks_exact(4).map(|c| [c[0], c[1], c[2]]).collect())
+    }
+
+    /// The words of one layer of a target, or of a buffer; `None` if the last frame did without it.
+    pub fn words(&mut self, id: Id, layer: u32) -> Result<Option<Vec<u32>>, HostError> {
+        let bytes = match self.renderer.spec(id) {
+            None => return Ok(None),
+            Some(Spec::Image(spec)) if layer >= spec.layers || spec.size != self.size => return Ok(None),
+            Some(Spec::Image(spec)) => {
+                let texel = if spec.format == FORMAT { 16 } else { 4 };
+                u64::from(spec.size[0]) * u64::from(spec.size[1]) * texel
+            }
+            Some(Spec::Buffer { bytes, .. }) => bytes,
+        };
+        let renderer = &mut self.renderer;
+        // SAFETY: recorded outside rendering after the frame; the buffer has room for the whole layer.
+        let data = self.gpu.read_back(bytes, |cmd, to| Ok(unsafe { renderer.record_copy(cmd, id, layer, to, 0) }?))?;
+        Ok(Some(data.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect()))
+    }
+
+    pub fn end(self) {
+        let Session { renderer, .. } = self;
+        // SAFETY: every `run` has waited.
+        unsafe { renderer.destroy() };
+    }
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.chunks_exact(4).map(|w| f32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect()
+}

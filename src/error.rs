@@ -1,0 +1,60 @@
+//! What can go wrong, and what to do about it.
+
+use ash::vk;
+
+/// Errors of the renderer. Each names the pass, resource or parameter, and the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The device lacks something every frame needs.
+    #[error(
+        "device {device}: {missing} is missing; meniscus needs it. Pick another device, or enable it when the device is created"
+    )]
+    Unsupported {
+        /// Device name.
+        device: String,
+        /// Feature, format, limit or queue capability.
+        missing: String,
+    },
+    /// A Vulkan call failed.
+    #[error("{what}: {result}")]
+    Vulkan {
+        /// What was being made or recorded.
+        what: String,
+        /// Result code.
+        result: vk::Result,
+    },
+    /// Memory could not be had.
+    #[error("{resource} needs {bytes} bytes of device memory: {source}. Use a smaller size or fewer particles")]
+    Memory {
+        /// Resource name.
+        resource: String,
+        /// Size asked for.
+        bytes: u64,
+        /// The allocator's reason.
+        source: gpu_allocator::AllocationError,
+    },
+    /// A parameter is outside its range.
+    #[error("{parameter} is {value}: {remedy}")]
+    Parameter {
+        /// Parameter name.
+        parameter: &'static str,
+        /// Offending value.
+        value: String,
+        /// Allowed range, or what to do.
+        remedy: String,
+    },
+    /// The caller broke the order of calls.
+    #[error("{0}")]
+    Order(&'static str),
+}
+
+impl Error {
+    pub(crate) fn vulkan(what: impl Into<String>) -> impl FnOnce(vk::Result) -> Error {
+        let what = what.into();
+        move |result| Error::Vulkan { what, result }
+    }
+
+    pub(crate) fn parameter(parameter: &'static str, value: impl ToString, remedy: impl Into<String>) -> Error {
+        Error::Parameter { parameter, value: value.to_string(), remedy: remedy.into() }
+    }
+}

@@ -1,0 +1,31 @@
+//! THE FRAME, from top to bottom. Everything a frame does is a line here; each pass lives in `src/passes/` with its
+//! shader in `glsl/`, its CPU twin in `src/twin/` and its test in `tests/gpu/`, all under the same name.
+
+use crate::{Error, passes::Passes, recorder::Recorder, settings::Settings, targets::Needs};
+
+/// Records the passes of one frame. What a scene does not need is not there: no splash particles, no splash maps; one
+/// refraction, no back maps; no particles at all, only the background.
+pub(crate) fn record(r: &mut Recorder, passes: &mut Passes, needs: &Needs, settings: &Settings) -> Result<(), Error> {
+    if needs.splash + needs.body > 0 {
+        // Counters to zero, indirect draws to "everything as points".
+        passes.reset.record(r, needs)?;
+        // Which particles can show at all.
+        if needs.body > 0 && needs.occlusion {
+            passes.occlude.record(r, needs)?;
+        }
+        passes.cull.record(r, needs)?;
+        // Nearest fronts and farthest backs of both classes, ray-cast (Imai16 §4.2).
+        passes.splat.record(r, needs)?;
+    }
+    if needs.body > 0 {
+        // The body's surfaces, smoothed (Imai16 §4.3). A smoothing filter goes here.
+        for iteration in 0..needs.iterations {
+            passes.plane_fit.record(r, needs, settings, iteration)?;
+        }
+        if needs.iterations > 0 {
+            passes.normals.record(r, needs)?;
+        }
+    }
+    // Up to four refractions, and the light they bring back (Imai16 §4.4, §4.5).
+    passes.refract.record(r, needs, settings)
+}

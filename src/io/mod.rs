@@ -1,0 +1,3 @@
+//! Particle files and images.
+pub mod images;
+pub mod particles;

@@ -1,0 +1,55 @@
+//! Particle liquids with complex refractions, recorded into *your* Vulkan command buffer.
+//!
+//! Positions of simulation particles go in; out comes water through which light bends up to four times, with
+//! absorption, reflections and total internal reflection, in screen space (Imai, Kanamori, Mitani, "Real-Time
+//! Screen-Space Liquid Rendering with Complex Refractions", 2016; "Imai16" throughout).
+//!
+//! # The contract
+//!
+//! * [`Renderer`] borrows the host's instance, device and allocator ([`Host`]); it creates no device, submits
+//!   nothing, waits for nothing and presents nothing. It needs Vulkan 1.3 with `dynamicRendering` and
+//!   `synchronization2` enabled, and one queue family with graphics and compute; see [`device`].
+//! * [`Renderer::record`] records one frame, [`frame::record`] is that frame from top to bottom.
+//! * Frames are submitted to one queue in the order they were recorded. Before the host records into a slot again
+//!   (`slot < frames_in_flight`), the frame last recorded into it has completed. Replaced resources are kept until
+//!   then, and destroyed without waiting.
+//! * The output image is in `COLOR_ATTACHMENT_OPTIMAL` before and after; it is written as a colour attachment.
+//!   The host makes it available before, and makes it visible afterwards.
+//! * The same input gives the same bits on the same driver, in whatever order the particles come.
+//!
+//! # Spaces and units
+//!
+//! World units are the scene's own. Eye space is right-handed and looks down -z; *linear depth* is `d = -z_eye > 0`.
+//! Colours are linear; a UNORM output is encoded as sRGB in the last shader, a float output is not.
+#![warn(missing_docs)]
+#![deny(unsafe_op_in_unsafe_fn)]
+#![warn(clippy::undocumented_unsafe_blocks)]
+
+pub mod access;
+pub mod device;
+pub mod environment;
+pub mod error;
+pub mod frame;
+#[cfg(feature = "host")]
+pub mod host;
+#[cfg(feature = "io")]
+pub mod io;
+pub mod particles;
+mod passes;
+mod pipeline;
+pub mod prepare;
+pub mod profile;
+mod recorder;
+pub mod renderer;
+mod resources;
+pub mod settings;
+pub mod shader;
+pub mod targets;
+pub mod twin;
+
+pub use device::Host;
+pub use environment::Equirect;
+pub use error::Error;
+pub use particles::{Class, Ellipsoid, Particles};
+pub use renderer::{FrameInput, Renderer, SceneInput};
+pub use settings::{Camera, Fresnel, Settings, Weighting};

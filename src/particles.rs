@@ -1,0 +1,54 @@
+//! Particles as they are drawn.
+
+use glam::{Mat3, Vec3};
+
+/// Which of the two kinds of liquid a particle belongs to (Imai16 §4.1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Class {
+    /// An isolated droplet: drawn as a sphere, never smoothed.
+    Splash = 0,
+    /// Part of the liquid body: drawn as an ellipsoid, its surface smoothed.
+    Body = 1,
+}
+
+/// A particle as drawn, in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ellipsoid {
+    /// Centre.
+    pub center: Vec3,
+    /// The three semi-axis vectors, as columns.
+    pub axes: Mat3,
+}
+
+/// Everything a frame draws: splash particles first, then the body's, each in canonical order
+/// ([`crate::prepare::prepare`] makes it so), which makes the image independent of the order of the input.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Particles {
+    /// Particle radius r: half the rest spacing.
+    pub radius: f32,
+    /// Splash, then body.
+    pub ellipsoids: Vec<Ellipsoid>,
+    /// How many of them are splash.
+    pub splash_count: usize,
+}
+
+impl Particles {
+    /// How many belong to the body.
+    pub fn body_count(&self) -> usize {
+        self.ellipsoids.len() - self.splash_count
+    }
+
+    /// World-space box around every ellipsoid: (smallest, largest) corner; `None` without particles.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        self.ellipsoids
+            .iter()
+            .map(|e| {
+                // The support of A u over |u| = 1 along each axis is the length of A's row.
+                let t = e.axes.transpose();
+                let reach = Vec3::new(t.x_axis.length(), t.y_axis.length(), t.z_axis.length());
+                (e.center - reach, e.center + reach)
+            })
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+}

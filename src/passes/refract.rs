@@ -1,0 +1,93 @@
+//! The walk of each view ray through the liquid, and its colour (`glsl/refract.frag`; Imai16 §4.4, §4.5).
+
+use super::Pipelines;
+use crate::{
+    Error,
+    access::Access,
+    device::Host,
+    pipeline::{Graphics, Pipeline},
+    recorder::{Recorder, bound, used},
+    settings::{Fresnel, Settings},
+    shader::{self, REFRACT_VERT},
+    targets::{Id, Needs},
+};
+use ash::vk;
+
+pub(crate) struct Refract {
+    /// By specialisation, and whether it writes what the walk met.
+    pub pipelines: Pipelines<([u32; 7], bool)>,
+    output: vk::Format,
+}
+
+/// Formats into which light is written as it is; all others take it encoded as sRGB.
+fn is_linear(format: vk::Format) -> bool {
+    use vk::Format as F;
+    matches!(format, F::R32G32B32A32_SFLOAT | F::R16G16B16A16_SFLOAT | F::B10G11R11_UFLOAT_PACK32)
+}
+
+impl Refract {
+    pub fn new(_host: &Host, output: vk::Format) -> Refract {
+        Refract { pipelines: Pipelines::default(), output }
+    }
+
+    pub fn record(&mut self, r: &mut Recorder, needs: &Needs, settings: &Settings) -> Result<(), Error> {
+        let (splash, body) = (needs.splash > 0, needs.body > 0);
+        // A class without particles has no maps; the shader then does not look, but something has to be bound.
+        let body_maps = (needs.body_depth(), needs.body_normal());
+        let splash_maps = (Id::SplashDepth, Id::SplashNormal);
+        let (body_depth, body_normal) = if body { body_maps } else { splash_maps };
+        let (splash_depth, splash_normal) = if splash || !body { splash_maps } else { body_maps };
+        let mut uses = vec![
+            bound(1, body_depth, Access::FragmentRead),
+            bound(2, body_normal, Access::FragmentRead),
+            bound(3, splash_depth, Access::FragmentRead),
+            bound(4, splash_normal, Access::FragmentRead),
+            bound(5, Id::Environment, Access::FragmentRead),
+            bound(6, Id::SceneColor, Access::FragmentRead),
+            bound(7, Id::SceneDepth, Access::FragmentRead),
+            used(Id::Output, Access::ColorAttachment),
+        ];
+        let mut colors = vec![(Id::Output, 0)];
+        let mut formats = vec![self.output];
+        if needs.debug {
+            for id in [Id::Walk, Id::Direction] {
+                uses.push(used(id, Access::ColorAttachment));
+                colors.push((id, 0));
+                formats.push(vk::Format::R32G32B32A32_SFLOAT);
+            }
+        }
+        let has_scene = r.externals.scene_color.0 != r.externals.environment;
+        let constants = [
+            settings.refractions,
+            settings.internal_reflections,
+            u32::from(settings.fresnel == Fresnel::Exact),
+            u32::from(splash),
+            u32::from(body),
+            u32::from(has_scene),
+            u32::from(!is_linear(self.output)),
+        ];
+        let host = r.host;
+        let pipeline = self.pipelines.get((constants, needs.debug), |(constants, debug)| {
+            Pipeline::graphics(
+                host,
+                &Graphics {
+                    vertex: &REFRACT_VERT,
+                    fragment: if *debug { &shader::REFRACT_DEBUG_FRAG } else { &shader::REFRACT_FRAG },
+                    constants,
+                    topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+                    colors: &formats,
+                    depth: false,
+                    push_bytes: 0,
+                },
+            )
+        })?;
+        r.pass("refract", &uses, |r| {
+            r.render(&colors, None, |r| {
+                r.bind(pipeline, &uses)?;
+                // SAFETY: inside rendering, with the pipeline and its set bound.
+                unsafe { host.device.cmd_draw(r.cmd, 3, 1, 0, 0) };
+                Ok(())
+            })
+        })
+    }
+}

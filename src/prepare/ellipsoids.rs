@@ -1,0 +1,141 @@
+//! Anisotropic kernels: an ellipsoid for each particle of the body (YuTurk13).
+
+use glam::{DMat3, DVec3};
+
+use super::density::lattice;
+use super::neighbours::Grid;
+use super::options::{Options, Scale};
+use crate::particles::Ellipsoid;
+
+/// Below this share of the filled body's variance the neighbours lie on one spot: their spread
+/// says nothing about a shape.
+const DEGENERATE: f64 = 0.05;
+
+/// How an ellipsoid came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shape {
+    /// Not fitted: a splash's sphere, or the caller's ellipsoid.
+    Given,
+    /// A sphere: too few neighbours.
+    FewNeighbours,
+    /// A sphere: the neighbours coincide.
+    Degenerate,
+    /// Fitted; whether a semi-axis was cut to the longest allowed, and whether one was raised to
+    /// the largest ratio allowed.
+    Fitted { long: bool, ratio: bool },
+}
+
+/// YuTurk13's weight 1 - (d / reach)³ of a neighbour at distance d.
+fn weight(distance: f64, reach: f64) -> f64 {
+    let q = distance / reach;
+    1.0 - q * q * q
+}
+
+/// Eigenvalue (all three are equal) of the weighted covariance of a filled body's [`lattice`],
+/// `reach` and the result in particle radii and their square.
+pub fn lattice_variance(reach: f64) -> f64 {
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for point in lattice(reach) {
+        let w = weight(point.length(), reach);
+        sum += w;
+        squares += w * point.x * point.x;
+    }
+    squares / sum
+}
+
+/// Fits the ellipsoid of each particle from its neighbours within twice the support.
+pub(super) struct Fitter<'a> {
+    grid: &'a Grid,
+    options: &'a Options,
+    scale: Scale,
+    full: f64,
+}
+
+impl<'a> Fitter<'a> {
+    pub fn new(grid: &'a Grid, scale: Scale, options: &'a Options) -> Self {
+        let full = lattice_variance(scale.reach() / scale.radius) * scale.radius.powi(2);
+        Self { grid, options, scale, full }
+    }
+
+    /// YuTurk13 §4 with the eigenvalues themselves, not their roots, as lengths. Particle `i`
+    /// counts in the mean and the covariance with weight 1, but not as its own neighbour.
+    ///
+    /// As in the paper, liquid shrinks: with the defaults the outermost centres of a flat surface
+    /// sink by 1.85 r, the next layer by 0.94 r, and a lone block of 27 particles from 6 r to
+    /// 1.25 r across. A smaller support or λ takes less.
+    pub fn fit(&self, i: usize, near: &[u32]) -> (Ellipsoid, Shape) {
+        let (center, radius) = (self.grid.positions[i], self.scale.radius);
+        let sphere = super::sphere(center, radius as f32);
+        if near.len() <= self.options.min_neighbours + 1 {
+            return (sphere, Shape::FewNeighbours);
+        }
+
+        // Offsets from the particle itself, so that nothing is lost far from the origin.
+        let origin = center.as_dvec3();
+        let (mut sum, mut mean, mut covariance) = (0.0, DVec3::ZERO, DMat3::ZERO);
+        for &j in near {
+            let offset = self.grid.positions[j as usize].as_dvec3() - origin;
+            let weighted = offset * weight(offset.length(), self.scale.reach());
+            sum += weight(offset.length(), self.scale.reach());
+            mean += weighted;
+            covariance += outer(offset, weighted);
+        }
+        mean /= sum;
+        let (variances, frame) = eigen_symmetric(covariance * (1.0 / sum) - outer(mean, mean));
+        if variances.x < DEGENERATE * self.full {
+            return (sphere, Shape::Degenerate);
+        }
+
+        let least = variances.x / f64::from(self.options.max_ratio);
+        let wanted = variances.max(DVec3::splat(least)) * (radius / self.full);
+        let longest = radius * f64::from(self.options.max_semi_axis);
+        let lengths = wanted.min(DVec3::splat(longest));
+        let center = origin + mean * f64::from(self.options.smoothing);
+        let axes = (frame * DMat3::from_diagonal(lengths)).as_mat3();
+        let shape = Shape::Fitted { long: wanted.x > longest, ratio: variances.z < least };
+        (Ellipsoid { center: center.as_vec3(), axes }, shape)
+    }
+}
+
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// Eigenvalues of a symmetric matrix in descending order, and its eigenvectors as the columns of
+/// a right-handed frame: eight sweeps of cyclic Jacobi rotations, where five suffice.
+///
+/// The largest component of the first two vectors is positive, so equal input gives equal signs.
+pub fn eigen_symmetric(matrix: DMat3) -> (DVec3, DMat3) {
+    let mut a = matrix.to_cols_array_2d();
+    let mut vectors = DVec3::AXES;
+    for _ in 0..8 {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if a[p][q] == 0.0 {
+                continue;
+            }
+            // The smaller root of t² + 2θt - 1 = 0; an overflowing θ gives t = 0.
+            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+            let t = 1f64.copysign(theta) / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
+            let s = t * c;
+            let (shift, k) = (t * a[p][q], 3 - p - q);
+            a[p][p] -= shift;
+            a[q][q] += shift;
+            (a[p][q], a[q][p]) = (0.0, 0.0);
+            let (kp, kq) = (c * a[k][p] - s * a[k][q], s * a[k][p] + c * a[k][q]);
+            (a[k][p], a[p][k], a[k][q], a[q][k]) = (kp, kp, kq, kq);
+            let (vp, vq) = (vectors[p], vectors[q]);
+            (vectors[p], vectors[q]) = (vp * c - vq * s, vp * s + vq * c);
+        }
+    }
+    let mut index = [0, 1, 2];
+    index.sort_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
+    let [first, second] = [0, 1].map(|k| positive(vectors[index[k]]));
+    let values = DVec3::from(index.map(|i| a[i][i]));
+    (values, DMat3::from_cols(first, second, first.cross(second)))
+}
+
+fn positive(vector: DVec3) -> DVec3 {
+    let largest = vector[vector.abs().max_position()];
+    if largest < 0.0 { -vector } else { vector }
+}

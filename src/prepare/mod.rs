@@ -1,0 +1,217 @@
+//! From simulated particles to what is drawn: spheres for splashes, ellipsoids for the body.
+//!
+//! All of it runs on the CPU, once for each frame of particles. The result depends on the set of
+//! particles alone: a shuffled input gives bit-identical output, on any number of threads.
+
+pub mod density;
+pub mod ellipsoids;
+pub mod neighbours;
+mod options;
+mod spacing;
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::{Mat3, Vec3};
+
+pub use density::{DensityField, classify};
+pub use neighbours::Search;
+pub use options::Options;
+pub use spacing::estimate_radius;
+
+use crate::particles::{Class, Ellipsoid, Particles};
+use ellipsoids::{Fitter, Shape};
+use neighbours::Grid;
+use options::Scale;
+
+/// One frame of particles, in world units.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// Centres.
+    pub positions: &'a [Vec3],
+    /// Particle radius: half the rest spacing. One far too large makes everything everybody's
+    /// neighbour, and the time quadratic.
+    pub radius: f32,
+    /// Classes to use instead of the threshold's.
+    pub classes: Option<&'a [Class]>,
+    /// Semi-axes (columns) to use unchanged, instead of fitted ones, for particles of the body.
+    pub ellipsoids: Option<&'a [Mat3]>,
+}
+
+/// How many particles went which way; the guards count particles of the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Report {
+    /// Particles drawn as splash.
+    pub splash: usize,
+    /// Particles drawn as body.
+    pub body: usize,
+    /// Left spheres for want of neighbours.
+    pub few_neighbours: usize,
+    /// Left spheres because their neighbours coincide.
+    pub degenerate: usize,
+    /// Cut to the longest semi-axis.
+    pub clamped_long: usize,
+    /// Thickened to the largest ratio.
+    pub clamped_ratio: usize,
+}
+
+/// Why particles could not be prepared. Indices are those of the input.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PrepareError {
+    /// A radius that is not finite and positive.
+    #[error("particle radius {0} is not a positive number: give half the rest spacing, in world units")]
+    Radius(f32),
+    /// An option out of its range.
+    #[error("option {name} = {value}: it must be {must}")]
+    Option { name: &'static str, value: f32, must: &'static str },
+    /// A position that is not finite.
+    #[error("particle {index} at {position} is not finite: remove it")]
+    Position { index: usize, position: Vec3 },
+    /// An array that does not hold one entry for each particle.
+    #[error("{what}: {found} of them for {particles} particles; give one for each, or none at all")]
+    Length { what: &'static str, found: usize, particles: usize },
+    /// A position too far out for whole cells of `size`, the support.
+    #[error(
+        "particle {index} at {position} lies more than 2^28 cells of {size} from the origin: \
+         remove it, or check the radius"
+    )]
+    TooFar { index: usize, position: Vec3, size: f64 },
+    /// A given ellipsoid that has no volume.
+    #[error("the ellipsoid of particle {index} is flat or not finite: give three independent semi-axes")]
+    Ellipsoid { index: usize },
+    /// More particles than 32-bit indices tell apart.
+    #[error("{0} particles: at most 2^32 - 1 fit")]
+    TooMany(usize),
+}
+
+fn check_positions(positions: &[Vec3]) -> Result<(), PrepareError> {
+    match positions.iter().position(|p| !p.is_finite()) {
+        Some(index) => Err(PrepareError::Position { index, position: positions[index] }),
+        None => Ok(()),
+    }
+}
+
+fn check_lengths(what: &'static str, found: Option<usize>, particles: usize) -> Result<(), PrepareError> {
+    match found {
+        Some(found) if found != particles => Err(PrepareError::Length { what, found, particles }),
+        _ => Ok(()),
+    }
+}
+
+/// Finite, and its columns well away from one plane (which is judged without their lengths).
+fn is_ellipsoid(axes: &Mat3) -> bool {
+    let axes = axes.as_dmat3();
+    let box_volume = axes.x_axis.length() * axes.y_axis.length() * axes.z_axis.length();
+    axes.is_finite() && box_volume > 0.0 && axes.determinant().abs() > 1e-6 * box_volume
+}
+
+/// Classifies particles and gives each its ellipsoid; see [`prepare_with_progress`].
+pub fn prepare(input: &Input, options: &Options) -> Result<(Particles, Report), PrepareError> {
+    prepare_with_progress(input, options, &|_| ())
+}
+
+/// Classifies particles by number density (Imai16 §4.1), and gives those of the body their
+/// anisotropic ellipsoids (YuTurk13) and a splash a sphere, splashes first.
+///
+/// `progress` is told how many particles are done, now and then, from any thread and not always in
+/// order; the last number is the count of particles. An ellipsoid given for a splash is ignored.
+pub fn prepare_with_progress(
+    input: &Input,
+    options: &Options,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<(Particles, Report), PrepareError> {
+    let Input { positions, radius, classes, ellipsoids } = *input;
+    let scale = Scale::new(radius, options)?;
+    check_lengths("classes", classes.map(<[_]>::len), positions.len())?;
+    check_lengths("ellipsoids", ellipsoids.map(<[_]>::len), positions.len())?;
+    check_positions(positions)?;
+
+    // What tells particles at the same place apart.
+    let extra = |i: u32| {
+        let axes = ellipsoids.map(|given| given[i as usize].to_cols_array().map(f32::to_bits));
+        (classes.map(|given| given[i as usize] as u8), axes)
+    };
+    let grid = Grid::new(positions, scale.support, |a, b| extra(a).cmp(&extra(b)))?;
+    let classes: Vec<Class> = match classes {
+        Some(given) => grid.order.iter().map(|&i| given[i as usize]).collect(),
+        None => density::relative_densities(&grid, scale, options.search)
+            .into_iter()
+            .map(|relative| density::class_of(relative, options))
+            .collect(),
+    };
+
+    let shapes = match ellipsoids {
+        Some(given) => given_shapes(&grid, radius, &classes, given)?,
+        None => {
+            let fitter = Fitter::new(&grid, scale, options);
+            let done = AtomicUsize::new(0);
+            grid.map_neighbours(scale.reach(), options.search, |i, near| {
+                let before = done.fetch_add(1, Ordering::Relaxed);
+                if before % 4096 == 4095 {
+                    progress(before + 1);
+                }
+                match classes[i] {
+                    Class::Splash => (sphere(grid.positions[i], radius), Shape::Given),
+                    Class::Body => fitter.fit(i, near),
+                }
+            })
+        }
+    };
+    progress(positions.len());
+    Ok(assemble(radius, &classes, &shapes))
+}
+
+fn sphere(center: Vec3, radius: f32) -> Ellipsoid {
+    let axes = Mat3::from_diagonal(Vec3::splat(radius));
+    Ellipsoid { center, axes }
+}
+
+/// The caller's ellipsoids, checked, in the grid's order.
+fn given_shapes(
+    grid: &Grid,
+    radius: f32,
+    classes: &[Class],
+    given: &[Mat3],
+) -> Result<Vec<(Ellipsoid, Shape)>, PrepareError> {
+    let mut shapes = Vec::with_capacity(classes.len());
+    let mut bad = None;
+    for ((&index, &center), class) in grid.order.iter().zip(&grid.positions).zip(classes) {
+        let index = index as usize;
+        let mut ellipsoid = sphere(center, radius);
+        if *class == Class::Body {
+            ellipsoid.axes = given[index];
+            if !is_ellipsoid(&given[index]) && bad.is_none_or(|bad| index < bad) {
+                bad = Some(index);
+            }
+        }
+        shapes.push((ellipsoid, Shape::Given));
+    }
+    match bad {
+        Some(index) => Err(PrepareError::Ellipsoid { index }),
+        None => Ok(shapes),
+    }
+}
+
+/// Splashes first, then the body, each in the grid's order.
+fn assemble(radius: f32, classes: &[Class], shapes: &[(Ellipsoid, Shape)]) -> (Particles, Report) {
+    let mut report = Report::default();
+    let (mut ellipsoids, mut body) = (Vec::with_capacity(shapes.len()), Vec::new());
+    for (&(ellipsoid, shape), class) in shapes.iter().zip(classes) {
+        match class {
+            Class::Splash => ellipsoids.push(ellipsoid),
+            Class::Body => body.push(ellipsoid),
+        }
+        match shape {
+            Shape::Given => {}
+            Shape::FewNeighbours => report.few_neighbours += 1,
+            Shape::Degenerate => report.degenerate += 1,
+            Shape::Fitted { long, ratio } => {
+                report.clamped_long += usize::from(long);
+                report.clamped_ratio += usize::from(ratio);
+            }
+        }
+    }
+    (report.splash, report.body) = (ellipsoids.len(), body.len());
+    ellipsoids.append(&mut body);
+    let splash_count = report.splash;
+    (Particles { radius, ellipsoids, splash_count }, report)
+}

@@ -1,0 +1,88 @@
+//! GPU time of each pass: one scope a pass, a pair of timestamps each, read without waiting.
+
+use crate::{Error, device::Host};
+use ash::vk;
+
+/// GPU time of one pass in milliseconds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassTime {
+    /// The pass's name, also its debug label.
+    pub name: String,
+    /// Milliseconds from the pass's first to its last command.
+    pub ms: f64,
+}
+
+/// GPU times of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameTimes {
+    /// Every pass, in order.
+    pub passes: Vec<PassTime>,
+    /// First to last timestamp of the frame.
+    pub span_ms: f64,
+}
+
+/// Most passes a frame has: 20 iterations of smoothing and a dozen others.
+const SCOPES: u32 = 64;
+
+pub(crate) struct Profiler {
+    pool: vk::QueryPool,
+    names: Vec<String>,
+    period_ns: f64,
+    mask: u64,
+}
+
+impl Profiler {
+    pub fn new(host: &Host) -> Result<Option<Profiler>, Error> {
+        let limits = host.limits();
+        let Some(period) = limits.timestamp_period else { return Ok(None) };
+        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * SCOPES);
+        // SAFETY: complete info on a live device.
+        let pool = unsafe { host.device.create_query_pool(&info, None) }.map_err(Error::vulkan("timestamps"))?;
+        Ok(Some(Profiler { pool, names: Vec::new(), period_ns: f64::from(period), mask: limits.timestamp_mask }))
+    }
+
+    pub fn begin_frame(&mut self, device: &ash::Device, cmd: vk::CommandBuffer) {
+        self.names.clear();
+        // SAFETY: the slot's last frame has completed (contract), and `cmd` is recording outside rendering.
+        unsafe { device.cmd_reset_query_pool(cmd, self.pool, 0, 2 * SCOPES) };
+    }
+
+    pub fn begin(&mut self, device: &ash::Device, cmd: vk::CommandBuffer, name: &str) {
+        if (self.names.len() as u32) < SCOPES {
+            self.names.push(name.into());
+            self.stamp(device, cmd, 2 * (self.names.len() as u32 - 1));
+        }
+    }
+
+    pub fn end(&mut self, device: &ash::Device, cmd: vk::CommandBuffer) {
+        self.stamp(device, cmd, 2 * (self.names.len() as u32 - 1) + 1);
+    }
+
+    fn stamp(&self, device: &ash::Device, cmd: vk::CommandBuffer, query: u32) {
+        // SAFETY: `query` is inside the pool, reset in this frame, and written once.
+        unsafe { device.cmd_write_timestamp2(cmd, vk::PipelineStageFlags2::ALL_COMMANDS, self.pool, query) };
+    }
+
+    /// The last frame's times, if it has completed.
+    pub fn read(&self, device: &ash::Device) -> Option<FrameTimes> {
+        let mut ticks = vec![0u64; 2 * self.names.len()];
+        if ticks.is_empty() {
+            return None;
+        }
+        // SAFETY: the queries were reset and written; without WAIT this returns NOT_READY until they are there.
+        unsafe { device.get_query_pool_results(self.pool, 0, &mut ticks, vk::QueryResultFlags::TYPE_64) }.ok()?;
+        let ms = |from: u64, to: u64| (to.wrapping_sub(from) & self.mask) as f64 * self.period_ns * 1e-6;
+        let passes = self
+            .names
+            .iter()
+            .zip(ticks.chunks(2))
+            .map(|(n, t)| PassTime { name: n.clone(), ms: ms(t[0], t[1]) })
+            .collect();
+        Some(FrameTimes { passes, span_ms: ms(ticks[0], ticks[ticks.len() - 1]) })
+    }
+
+    pub fn destroy(&mut self, device: &ash::Device) {
+        // SAFETY: called when no frame is in flight.
+        unsafe { device.destroy_query_pool(self.pool, None) };
+    }
+}

@@ -1,0 +1,493 @@
+//! The renderer: made for a host's device, fed with particles, records frames.
+
+use crate::{
+    Error, access,
+    device::{self, Host, Limits},
+    environment::Equirect,
+    frame,
+    particles::Particles,
+    passes::Passes,
+    profile::{FrameTimes, Profiler},
+    recorder::{Externals, PlanEntry, Recorder, Resource, Table, used},
+    resources::{Buffer, Doomed, Image, ImageSpec, Retired},
+    settings::{Camera, Settings},
+    shader,
+    targets::{self, Id, LedgerEntry, Needs, Spec},
+};
+use ash::vk;
+use glam::{Mat3, Vec3, Vec4};
+use gpu_allocator::MemoryLocation;
+
+/// The host's opaque scene, rendered before the liquid at the same size and with the same camera.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneInput {
+    /// Linear colour, sampled in the fragment stage.
+    pub color: vk::ImageView,
+    /// Layout the colour is in, before and after.
+    pub color_layout: vk::ImageLayout,
+    /// Depth buffer (depth aspect) of the camera's projection, sampled in the fragment stage.
+    pub depth: vk::ImageView,
+    /// Layout the depth is in, before and after.
+    pub depth_layout: vk::ImageLayout,
+    /// Depth value where nothing was drawn: the environment is seen there.
+    pub cleared_depth: f32,
+}
+
+/// One frame.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameInput<'a> {
+    /// Which of the frames in flight this is.
+    pub slot: usize,
+    /// Camera.
+    pub camera: &'a Camera,
+    /// Smoothing and optics.
+    pub settings: &'a Settings,
+    /// Host's opaque scene, if there is one.
+    pub scene: Option<SceneInput>,
+    /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it.
+    pub eye_inside: bool,
+    /// Output, of the format given to [`Renderer::new`] and the size given to [`Renderer::resize`], in
+    /// `COLOR_ATTACHMENT_OPTIMAL` before and after.
+    pub output: vk::ImageView,
+    /// Also write what each walk met into [`Id::Walk`] and [`Id::Direction`], for dumps and statistics.
+    pub debug: bool,
+}
+
+/// What belongs to one of the frames in flight.
+struct Slot {
+    profiler: Option<Profiler>,
+    pool: vk::DescriptorPool,
+    frame_block: Buffer,
+    /// Number of the frame last recorded into this slot; 0: none yet.
+    frame: u64,
+}
+
+/// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
+///
+/// Call [`Renderer::destroy`] when the device is idle; a renderer that is only dropped leaks its Vulkan objects,
+/// because dropping must not wait and cannot know what is still in flight.
+#[must_use = "call Renderer::destroy when the device is idle"]
+pub struct Renderer {
+    host: Host,
+    limits: Limits,
+    size: [u32; 2],
+    passes: Passes,
+    table: Table,
+    slots: Vec<Slot>,
+    retired: Retired,
+    frame: u64,
+    particles: Option<Buffer>,
+    scene: SceneBounds,
+    environment: Option<Image>,
+    plan: Vec<PlanEntry>,
+}
+
+/// What the renderer remembers of the particles it was given.
+#[derive(Clone, Copy)]
+struct SceneBounds {
+    radius: f32,
+    splash: usize,
+    body: usize,
+    bounds: (Vec3, Vec3),
+}
+
+/// Descriptor sets of one frame: 20 iterations and a dozen others.
+const SETS: u32 = 64;
+
+impl Renderer {
+    /// Makes a renderer for outputs of one format: UNORM formats receive sRGB-encoded colour, float formats linear.
+    ///
+    /// # Safety
+    /// * The handles in `host` are alive and stay so until [`Renderer::destroy`] has returned.
+    /// * The device was created with [`device::required_features`], and with `largePoints` if `host` says so.
+    pub unsafe fn new(host: Host, output: vk::Format) -> Result<Renderer, Error> {
+        device::check(&host.instance, host.physical_device, host.queue_family)?;
+        host.check_attachment(output)?;
+        if host.frames_in_flight == 0 {
+            return Err(Error::parameter("frames in flight", 0, "use at least 1"));
+        }
+        let limits = host.limits();
+        let mut renderer = Renderer {
+            passes: Passes::new(&host, &limits, output),
+            host,
+            limits,
+            size: [0, 0],
+            table: Table::default(),
+            slots: Vec::new(),
+            retired: Retired::default(),
+            frame: 0,
+            particles: None,
+            scene: SceneBounds { radius: 1.0, splash: 0, body: 0, bounds: (Vec3::ZERO, Vec3::ZERO) },
+            environment: None,
+            plan: Vec::new(),
+        };
+        for _ in 0..renderer.host.frames_in_flight {
+            match Slot::new(&renderer.host) {
+                Ok(slot) => renderer.slots.push(slot),
+                Err(e) => {
+                    // SAFETY: nothing was recorded yet.
+                    unsafe { renderer.destroy() };
+                    return Err(e);
+                }
+            }
+        }
+        Ok(renderer)
+    }
+
+    /// Sets the size of outputs to come, in pixels. Allocates nothing: the next frame does.
+    pub fn resize(&mut self, size: [u32; 2]) -> Result<(), Error> {
+        let most = self.limits.image_size;
+        if size.contains(&0) || size.iter().any(|s| *s > most) {
+            let what = format!("{}x{}", size[0], size[1]);
+            return Err(Error::parameter("size", what, format!("use 1 to {most} pixels each way on this device")));
+        }
+        let bounds = 8 * u64::from(size[0]) * u64::from(size[1]);
+        if bounds > self.limits.storage_size {
+            let what = format!("{}x{}", size[0], size[1]);
+            return Err(Error::parameter("size", what, "its depth bounds do not fit a storage buffer of this device"));
+        }
+        self.size = size;
+        Ok(())
+    }
+
+    /// Device memory that frames take, resource by resource, before anything is allocated. The particle buffer is
+    /// extra: 48 bytes a particle; a static environment map 16 bytes a texel.
+    pub fn memory_requirements(&self, needs: &Needs) -> Vec<LedgerEntry> {
+        targets::ledger(&self.host.device, needs)
+    }
+
+    /// Device memory in use now, resource by resource.
+    pub fn memory(&self) -> Vec<LedgerEntry> {
+        let mut ledger = self.table.ledger();
+        ledger.extend(self.particles.iter().map(|b| LedgerEntry { name: Id::Particles.name(), bytes: b.bytes }));
+        ledger.extend(self.environment.iter().map(|i| LedgerEntry { name: Id::Environment.name(), bytes: i.bytes }));
+        ledger
+    }
+
+    /// What the next frame with these settings needs.
+    pub fn needs(&self, settings: &Settings, debug: bool) -> Needs {
+        Needs::new(self.size, self.scene.splash, self.scene.body, settings, debug)
+    }
+
+    /// Gives the particles of the frames to come. The host's memory is copied; the last particles are kept until the
+    /// frames that draw them have completed.
+    pub fn set_particles(&mut self, particles: &Particles) -> Result<(), Error> {
+        let count = particles.ellipsoids.len();
+        let bytes = (count.max(1) * size_of::<shader::Particle>()) as u64;
+        if !(particles.radius.is_finite() && particles.radius > 0.0) {
+            return Err(Error::parameter("particle radius", particles.radius, "use a finite length above 0"));
+        }
+        if bytes > self.limits.storage_size || count > i32::MAX as usize {
+            let remedy = format!(
+                "this device holds {} at most",
+                self.limits.storage_size / size_of::<shader::Particle>() as u64
+            );
+            return Err(Error::parameter("particles", count, remedy));
+        }
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        let mut buffer = Buffer::new(&self.host, Id::Particles.name(), bytes, usage, MemoryLocation::CpuToGpu)?;
+        let inverse = 1.0 / particles.radius;
+        for (out, e) in buffer.mapped().chunks_exact_mut(size_of::<shader::Particle>()).zip(&particles.ellipsoids) {
+            out.copy_from_slice(bytemuck::bytes_of(&pack(e.center, e.axes * inverse)));
+        }
+        if let Some(old) = self.particles.replace(buffer) {
+            self.retired.push(self.frame, Doomed::Buffer(old));
+        }
+        let bounds = particles.bounds().unwrap_or_default();
+        self.scene = SceneBounds {
+            radius: particles.radius,
+            splash: particles.splash_count,
+            body: particles.body_count(),
+            bounds,
+        };
+        Ok(())
+    }
+
+    /// Gives the environment of the frames to come; records its upload.
+    ///
+    /// # Safety
+    /// `cmd` is recording, outside rendering, and is submitted before the frames that see the map.
+    pub unsafe fn set_environment(&mut self, cmd: vk::CommandBuffer, map: &Equirect) -> Result<(), Error> {
+        let size = map.size();
+        if size.iter().any(|s| *s > self.limits.image_size) {
+            let what = format!("{}x{}", size[0], size[1]);
+            return Err(Error::parameter(
+                "environment map",
+                what,
+                format!("use at most {} pixels each way", self.limits.image_size),
+            ));
+        }
+        let bytes: &[u8] = bytemuck::cast_slice(map.texels());
+        let usage = vk::BufferUsageFlags::TRANSFER_SRC;
+        let mut staging =
+            Buffer::new(&self.host, "environment staging", bytes.len() as u64, usage, MemoryLocation::CpuToGpu)?;
+        staging.mapped()[..bytes.len()].copy_from_slice(bytes);
+        let spec = ImageSpec {
+            format: vk::Format::R32G32B32A32_SFLOAT,
+            size,
+            layers: 1,
+            array: false,
+            usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+        };
+        let image = match Image::new(&self.host, Id::Environment.name(), &spec) {
+            Ok(image) => image,
+            Err(e) => {
+                staging.destroy(&self.host);
+                return Err(e);
+            }
+        };
+        let mut state = access::State::default();
+        for access in [access::Access::TransferWrite, access::Access::FragmentRead] {
+            if let Some(b) = state.step(access, true) {
+                let barrier = vk::ImageMemoryBarrier2::default()
+                    .src_stage_mask(b.src.0)
+                    .src_access_mask(b.src.1)
+                    .old_layout(b.src.2)
+                    .dst_stage_mask(b.dst.0)
+                    .dst_access_mask(b.dst.1)
+                    .new_layout(b.dst.2)
+                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .image(image.handle)
+                    .subresource_range(access::whole(image.aspect));
+                let info = vk::DependencyInfo::default().image_memory_barriers(std::slice::from_ref(&barrier));
+                // SAFETY: `cmd` is recording (this function's contract); the image is new.
+                unsafe { self.host.device.cmd_pipeline_barrier2(cmd, &info) };
+            }
+            if access == access::Access::TransferWrite {
+                let layers =
+                    vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
+                let extent = vk::Extent3D { width: size[0], height: size[1], depth: 1 };
+                let copy = vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent);
+                let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+                // SAFETY: as above; the staging buffer holds exactly this image.
+                unsafe {
+                    self.host.device.cmd_copy_buffer_to_image(cmd, staging.handle, image.handle, layout, &[copy])
+                };
+            }
+        }
+        // The upload runs with the next frame at the latest; the old map may be seen by the last one.
+        self.retired.push(self.frame + 1, Doomed::Buffer(staging));
+        if let Some(old) = self.environment.replace(image) {
+            self.retired.push(self.frame, Doomed::Image(old));
+        }
+        Ok(())
+    }
+
+    /// Records one frame into the host's command buffer.
+    ///
+    /// # Safety
+    /// * `cmd` is recording, outside rendering, and goes to a queue of the family in [`Host`], after all frames
+    ///   recorded before it.
+    /// * The frame last recorded into `input.slot` has completed on the device.
+    /// * The output and the scene's images are alive, of this size, in the stated layouts, and their earlier writes
+    ///   are available to the fragment and colour-attachment stages.
+    pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, input: &FrameInput) -> Result<(), Error> {
+        input.settings.validate()?;
+        input.camera.validate()?;
+        if self.size == [0, 0] {
+            return Err(Error::Order("no size yet: call Renderer::resize first"));
+        }
+        let Some(environment) = self.environment.as_ref().map(|i| i.view) else {
+            return Err(Error::Order(
+                "no environment yet: call Renderer::set_environment first (Equirect::procedural_sky needs no file)",
+            ));
+        };
+        let Some(slot) = self.slots.get_mut(input.slot) else {
+            return Err(Error::parameter("slot", input.slot, "use less than Host::frames_in_flight"));
+        };
+        // The slot's last frame has completed, and with it every frame before.
+        self.retired.collect(&self.host, slot.frame);
+        let needs = Needs::new(self.size, self.scene.splash, self.scene.body, input.settings, input.debug);
+        self.table.fit(&self.host, &needs, &mut self.retired, self.frame)?;
+        self.table.discard_contents();
+        self.frame += 1;
+        slot.frame = self.frame;
+
+        let mut block = input.camera.uniforms(input.settings, self.size, self.scene.radius, self.scene.bounds);
+        block.particles.x = needs.splash;
+        block.particles.y = needs.body;
+        block.particles.z = self.limits.point_size as u32;
+        block.particles.w = u32::from(input.settings.quads_only || self.limits.point_size <= 1.0);
+        block.scene.w = f32::from(input.eye_inside);
+        let mut externals = Externals {
+            frame_block: slot.frame_block.handle,
+            particles: self.particles.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
+            environment,
+            scene_color: (environment, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
+            scene_depth: (environment, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
+            output: input.output,
+        };
+        if let Some(scene) = &input.scene {
+            let p = &input.camera.projection;
+            block.scene = Vec4::new(p.z_axis.z, p.w_axis.z, scene.cleared_depth, block.scene.w);
+            externals.scene_color = (scene.color, scene.color_layout);
+            externals.scene_depth = (scene.depth, scene.depth_layout);
+        }
+        slot.frame_block.mapped()[..size_of_val(&block)].copy_from_slice(bytemuck::bytes_of(&block));
+        // SAFETY: no set of this slot is in use (contract).
+        unsafe { self.host.device.reset_descriptor_pool(slot.pool, vk::DescriptorPoolResetFlags::empty()) }
+            .map_err(Error::vulkan("descriptor pool"))?;
+        if let Some(p) = &mut slot.profiler {
+            p.begin_frame(&self.host.device, cmd);
+        }
+        self.plan.clear();
+        let mut recorder = Recorder {
+            host: &self.host,
+            cmd,
+            table: &mut self.table,
+            externals,
+            pool: slot.pool,
+            profiler: slot.profiler.as_mut(),
+            plan: &mut self.plan,
+            size: self.size,
+        };
+        frame::record(&mut recorder, &mut self.passes, &needs, input.settings)
+    }
+
+    /// The barriers of the last recorded frame, in order; printable.
+    pub fn plan(&self) -> &[PlanEntry] {
+        &self.plan
+    }
+
+    /// GPU times of the frame last recorded into a slot; `None` until it has completed, or without timestamps.
+    pub fn times(&self, slot: usize) -> Option<FrameTimes> {
+        self.slots.get(slot)?.profiler.as_ref()?.read(&self.host.device)
+    }
+
+    /// How a resource of the last frame was made; `None` if that frame did without it.
+    pub fn spec(&self, id: Id) -> Option<Spec> {
+        self.table.spec(id)
+    }
+
+    /// Records a copy of one layer of a target (tightly packed rows) or of a whole buffer, as the last frame left it.
+    ///
+    /// # Safety
+    /// `cmd` is recording, outside rendering, and runs after the frame; `to` holds the content from `offset` on, was
+    /// made with `TRANSFER_DST`, and is made visible to the host by the caller.
+    pub unsafe fn record_copy(
+        &mut self,
+        cmd: vk::CommandBuffer,
+        id: Id,
+        layer: u32,
+        to: vk::Buffer,
+        offset: u64,
+    ) -> Result<(), Error> {
+        if self.table.get(id).is_none() {
+            return Err(Error::parameter("target", id.name(), "the last frame did without it"));
+        }
+        let mut recorder = Recorder {
+            host: &self.host,
+            cmd,
+            table: &mut self.table,
+            externals: Externals {
+                frame_block: vk::Buffer::null(),
+                particles: vk::Buffer::null(),
+                environment: vk::ImageView::null(),
+                scene_color: Default::default(),
+                scene_depth: Default::default(),
+                output: vk::ImageView::null(),
+            },
+            pool: vk::DescriptorPool::null(),
+            profiler: None,
+            plan: &mut self.plan,
+            size: self.size,
+        };
+        recorder.barriers("copy", &[used(id, access::Access::TransferRead)]);
+        match (self.table.get(id), self.table.spec(id)) {
+            (Some(Resource::Image(image)), Some(Spec::Image(spec))) => {
+                let layers = vk::ImageSubresourceLayers {
+                    aspect_mask: image.aspect,
+                    mip_level: 0,
+                    base_array_layer: layer,
+                    layer_count: 1,
+                };
+                let extent = vk::Extent3D { width: spec.size[0], height: spec.size[1], depth: 1 };
+                let copy =
+                    vk::BufferImageCopy::default().buffer_offset(offset).image_subresource(layers).image_extent(extent);
+                let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+                // SAFETY: the image was just brought into this layout; the rest is this function's contract.
+                unsafe { self.host.device.cmd_copy_image_to_buffer(cmd, image.handle, layout, to, &[copy]) };
+            }
+            (Some(Resource::Buffer(buffer)), Some(Spec::Buffer { bytes, .. })) => {
+                let copy = vk::BufferCopy { src_offset: 0, dst_offset: offset, size: bytes };
+                // SAFETY: as above.
+                unsafe { self.host.device.cmd_copy_buffer(cmd, buffer.handle, to, &[copy]) };
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Destroys everything the renderer made.
+    ///
+    /// # Safety
+    /// No frame recorded by this renderer is in flight.
+    pub unsafe fn destroy(mut self) {
+        self.table.retire_all(&mut self.retired, 0);
+        self.retired.collect(&self.host, u64::MAX);
+        if let Some(mut b) = self.particles.take() {
+            b.destroy(&self.host);
+        }
+        if let Some(mut i) = self.environment.take() {
+            i.destroy(&self.host);
+        }
+        for mut slot in self.slots.drain(..) {
+            slot.frame_block.destroy(&self.host);
+            // SAFETY: no frame is in flight (contract).
+            unsafe { self.host.device.destroy_descriptor_pool(slot.pool, None) };
+            if let Some(p) = &mut slot.profiler {
+                p.destroy(&self.host.device);
+            }
+        }
+        self.passes.destroy(&self.host);
+    }
+}
+
+impl Slot {
+    fn new(host: &Host) -> Result<Slot, Error> {
+        let size = |ty, count| vk::DescriptorPoolSize { ty, descriptor_count: count * SETS };
+        let sizes = [
+            size(vk::DescriptorType::UNIFORM_BUFFER, 1),
+            size(vk::DescriptorType::STORAGE_BUFFER, 5),
+            size(vk::DescriptorType::SAMPLED_IMAGE, 7),
+            size(vk::DescriptorType::STORAGE_IMAGE, 1),
+        ];
+        let usage = vk::BufferUsageFlags::UNIFORM_BUFFER;
+        let mut frame_block = Buffer::new(
+            host,
+            Id::FrameBlock.name(),
+            size_of::<shader::Frame>() as u64,
+            usage,
+            MemoryLocation::CpuToGpu,
+        )?;
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(&sizes);
+        // SAFETY: complete info on a live device.
+        let pool = match unsafe { host.device.create_descriptor_pool(&info, None) } {
+            Ok(pool) => pool,
+            Err(e) => {
+                frame_block.destroy(host);
+                return Err(Error::vulkan("descriptor pool")(e));
+            }
+        };
+        match Profiler::new(host) {
+            Ok(profiler) => Ok(Slot { profiler, pool, frame_block, frame: 0 }),
+            Err(e) => {
+                frame_block.destroy(host);
+                // SAFETY: just made, never used.
+                unsafe { host.device.destroy_descriptor_pool(pool, None) };
+                Err(e)
+            }
+        }
+    }
+}
+
+/// A particle as shaders read it; `axes` in particle radii.
+pub fn pack(center: Vec3, axes: Mat3) -> shader::Particle {
+    let s = axes * axes.transpose();
+    shader::Particle {
+        center: center.extend(0.0),
+        shape_diagonal: Vec4::new(s.x_axis.x, s.y_axis.y, s.z_axis.z, 0.0),
+        shape_mixed: Vec4::new(s.y_axis.x, s.z_axis.x, s.z_axis.y, 0.0),
+    }
+}

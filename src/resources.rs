@@ -1,0 +1,238 @@
+//! Images and buffers: made, named, retired by frame index and destroyed without waiting.
+
+use crate::{Error, device::Host};
+use ash::vk;
+use gpu_allocator::{
+    MemoryLocation,
+    vulkan::{Allocation, AllocationCreateDesc, AllocationScheme},
+};
+
+/// An image with its views: one of the whole, and one a layer for attachments.
+pub(crate) struct Image {
+    pub handle: vk::Image,
+    pub view: vk::ImageView,
+    pub layers: Vec<vk::ImageView>,
+    pub aspect: vk::ImageAspectFlags,
+    pub bytes: u64,
+    allocation: Option<Allocation>,
+}
+
+/// A buffer; mapped where it is the host that writes it.
+pub(crate) struct Buffer {
+    pub handle: vk::Buffer,
+    pub bytes: u64,
+    allocation: Option<Allocation>,
+}
+
+/// How an image is made; also what its memory is computed from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageSpec {
+    /// Format.
+    pub format: vk::Format,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Array layers; arrays are viewed as such even with one layer.
+    pub layers: u32,
+    /// Whether shaders see an array.
+    pub array: bool,
+    /// Usage.
+    pub usage: vk::ImageUsageFlags,
+}
+
+impl ImageSpec {
+    pub(crate) fn info(&self) -> vk::ImageCreateInfo<'static> {
+        vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(self.format)
+            .extent(vk::Extent3D { width: self.size[0], height: self.size[1], depth: 1 })
+            .mip_levels(1)
+            .array_layers(self.layers)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(self.usage)
+            .sharing_mode(vk::SharingMode::EXCLUSIVE)
+            .initial_layout(vk::ImageLayout::UNDEFINED)
+    }
+}
+
+fn allocate(
+    host: &Host,
+    name: &str,
+    requirements: vk::MemoryRequirements,
+    location: MemoryLocation,
+    linear: bool,
+) -> Result<Allocation, Error> {
+    let desc = AllocationCreateDesc {
+        name,
+        requirements,
+        location,
+        linear,
+        allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+    };
+    // A poisoned lock means that the host panicked while it held it; its allocator is still the one to ask.
+    let mut allocator = host.allocator.lock().unwrap_or_else(|e| e.into_inner());
+    allocator.allocate(&desc).map_err(|source| Error::Memory {
+        resource: name.into(),
+        bytes: requirements.size,
+        source,
+    })
+}
+
+fn free(host: &Host, allocation: &mut Option<Allocation>) {
+    if let Some(allocation) = allocation.take() {
+        let mut allocator = host.allocator.lock().unwrap_or_else(|e| e.into_inner());
+        // It came from this allocator; there is nothing a caller could do about a refusal.
+        let _ = allocator.free(allocation);
+    }
+}
+
+impl Image {
+    pub fn new(host: &Host, name: &str, spec: &ImageSpec) -> Result<Image, Error> {
+        // SAFETY: the info is complete and the device alive; this and the calls below destroy nothing in use.
+        let handle = unsafe { host.device.create_image(&spec.info(), None) }.map_err(Error::vulkan(name))?;
+        // SAFETY: the image was just made from this device.
+        let requirements = unsafe { host.device.get_image_memory_requirements(handle) };
+        let depth = spec.format == vk::Format::D32_SFLOAT;
+        let aspect = if depth { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
+        let mut image = Image {
+            handle,
+            view: vk::ImageView::null(),
+            layers: Vec::new(),
+            aspect,
+            bytes: requirements.size,
+            allocation: None,
+        };
+        match image.back(host, name, spec, requirements) {
+            Ok(()) => Ok(image),
+            Err(e) => {
+                image.destroy(host);
+                Err(e)
+            }
+        }
+    }
+
+    /// Binds memory and makes the views.
+    fn back(
+        &mut self,
+        host: &Host,
+        name: &str,
+        spec: &ImageSpec,
+        requirements: vk::MemoryRequirements,
+    ) -> Result<(), Error> {
+        let allocation = allocate(host, name, requirements, MemoryLocation::GpuOnly, false)?;
+        // SAFETY: memory of the image's own requirements, bound once, kept until the image is destroyed.
+        let bound = unsafe { host.device.bind_image_memory(self.handle, allocation.memory(), allocation.offset()) };
+        self.allocation = Some(allocation);
+        bound.map_err(Error::vulkan(name))?;
+        host.set_name(self.handle, name);
+        let view = |kind, first, count| {
+            let range = vk::ImageSubresourceRange {
+                base_array_layer: first,
+                layer_count: count,
+                ..crate::access::whole(self.aspect)
+            };
+            let info = vk::ImageViewCreateInfo::default()
+                .image(self.handle)
+                .view_type(kind)
+                .format(spec.format)
+                .subresource_range(range);
+            // SAFETY: the image is bound to memory and the range lies inside it.
+            unsafe { host.device.create_image_view(&info, None) }.map_err(Error::vulkan(name))
+        };
+        let kind = if spec.array { vk::ImageViewType::TYPE_2D_ARRAY } else { vk::ImageViewType::TYPE_2D };
+        let whole = view(kind, 0, spec.layers)?;
+        let layers: Result<Vec<_>, _> = (0..spec.layers).map(|l| view(vk::ImageViewType::TYPE_2D, l, 1)).collect();
+        self.view = whole;
+        self.layers = layers?;
+        host.set_name(self.view, name);
+        Ok(())
+    }
+
+    pub fn destroy(&mut self, host: &Host) {
+        // SAFETY: callers destroy only what no frame in flight uses; null handles are allowed.
+        unsafe {
+            for view in self.layers.drain(..) {
+                host.device.destroy_image_view(view, None);
+            }
+            host.device.destroy_image_view(self.view, None);
+            host.device.destroy_image(self.handle, None);
+        }
+        free(host, &mut self.allocation);
+    }
+}
+
+impl Buffer {
+    pub fn new(
+        host: &Host,
+        name: &str,
+        bytes: u64,
+        usage: vk::BufferUsageFlags,
+        location: MemoryLocation,
+    ) -> Result<Buffer, Error> {
+        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage).sharing_mode(vk::SharingMode::EXCLUSIVE);
+        // SAFETY: the info is complete and the device alive.
+        let handle = unsafe { host.device.create_buffer(&info, None) }.map_err(Error::vulkan(name))?;
+        // SAFETY: the buffer was just made from this device.
+        let requirements = unsafe { host.device.get_buffer_memory_requirements(handle) };
+        let mut buffer = Buffer { handle, bytes: requirements.size, allocation: None };
+        let bound = allocate(host, name, requirements, location, true).and_then(|allocation| {
+            // SAFETY: memory of the buffer's own requirements, bound once, kept until the buffer is destroyed.
+            let bound = unsafe { host.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
+            buffer.allocation = Some(allocation);
+            bound.map_err(Error::vulkan(name))
+        });
+        if let Err(e) = bound {
+            buffer.destroy(host);
+            return Err(e);
+        }
+        host.set_name(handle, name);
+        Ok(buffer)
+    }
+
+    /// The mapped memory; empty where the buffer is not the host's to write.
+    pub fn mapped(&mut self) -> &mut [u8] {
+        self.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).unwrap_or_default()
+    }
+
+    pub fn destroy(&mut self, host: &Host) {
+        // SAFETY: callers destroy only what no frame in flight uses.
+        unsafe { host.device.destroy_buffer(self.handle, None) };
+        free(host, &mut self.allocation);
+    }
+}
+
+/// Something that frames in flight may still use.
+pub(crate) enum Doomed {
+    Image(Image),
+    Buffer(Buffer),
+}
+
+impl Doomed {
+    fn destroy(&mut self, host: &Host) {
+        match self {
+            Doomed::Image(i) => i.destroy(host),
+            Doomed::Buffer(b) => b.destroy(host),
+        }
+    }
+}
+
+/// Replaced resources, each with the number of the last frame that may use it.
+#[derive(Default)]
+pub(crate) struct Retired(Vec<(u64, Doomed)>);
+
+impl Retired {
+    pub fn push(&mut self, last_frame: u64, doomed: Doomed) {
+        self.0.push((last_frame, doomed));
+    }
+
+    /// Destroys what only completed frames used: every frame up to and including `completed`.
+    pub fn collect(&mut self, host: &Host, completed: u64) {
+        self.0.retain_mut(|(last, doomed)| {
+            let keep = *last > completed;
+            if !keep {
+                doomed.destroy(host);
+            }
+            keep
+        });
+    }
+}

@@ -1,0 +1,198 @@
+//! What a frame is asked for: camera, smoothing and optics.
+
+use crate::{Error, shader::Frame};
+use glam::{Mat3, Mat4, UVec4, Vec3, Vec4};
+
+/// Reflectance of the water surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Fresnel {
+    /// Schlick's approximation (Imai16).
+    #[default]
+    Schlick,
+    /// Exact, for unpolarised light between dielectrics.
+    Exact,
+}
+
+/// Weights of plane fitting (Imai16 fig. 5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Weighting {
+    /// Difference of depths, eq. (2): keeps depth gaps.
+    #[default]
+    ViewDependent,
+    /// Distance of eye-space points: smooths across gaps; the paper's rejected alternative.
+    Euclidean,
+}
+
+/// Smoothing and optics of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Surfaces at which light bends: 1 (fronts only; no back maps are made), 2 or 4.
+    pub refractions: u32,
+    /// Total internal reflections followed in one walk, 0 to 64.
+    pub internal_reflections: u32,
+    /// Reflectance.
+    pub fresnel: Fresnel,
+    /// Index of refraction of the liquid against air, above 1 and at most 4.
+    pub ior: f32,
+    /// Absorption per world unit for red, green and blue, at least 0 (eq. 9: a·c_a).
+    pub absorption: Vec3,
+    /// Edge of the plane-fitting window in pixels: odd, 3 to [`Settings::MAX_WINDOW`].
+    pub window: u32,
+    /// Iterations of plane fitting, 0 to 20; 0 leaves the body as ray-cast.
+    pub iterations: u32,
+    /// σ of eq. (2) in particle radii, above 0 (Imai16: 5.3).
+    pub sigma: f32,
+    /// Weights of plane fitting.
+    pub weighting: Weighting,
+    /// Drop particles of the body that others hide. Changes no pixel.
+    pub occlusion_culling: bool,
+    /// Draw quads even where point sprites would do. Changes no pixel.
+    pub quads_only: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            refractions: 4,
+            internal_reflections: 4,
+            fresnel: Fresnel::Schlick,
+            ior: 1.333,
+            absorption: Vec3::ZERO,
+            window: 9,
+            iterations: 2,
+            sigma: 5.3,
+            weighting: Weighting::ViewDependent,
+            occlusion_culling: true,
+            quads_only: false,
+        }
+    }
+}
+
+impl Settings {
+    /// Largest window: its tile of normals and depths fills the 16 KiB of shared memory that Vulkan guarantees.
+    pub const MAX_WINDOW: u32 = 25;
+
+    /// Checks every range.
+    pub fn validate(&self) -> Result<(), Error> {
+        let check = |ok: bool, name, value: String, remedy: &str| {
+            if ok { Ok(()) } else { Err(Error::parameter(name, value, remedy)) }
+        };
+        check(matches!(self.refractions, 1 | 2 | 4), "refractions", self.refractions.to_string(), "use 1, 2 or 4")?;
+        check(
+            self.internal_reflections <= 64,
+            "internal reflections",
+            self.internal_reflections.to_string(),
+            "use 0 to 64",
+        )?;
+        check(
+            self.ior > 1.0 && self.ior <= 4.0,
+            "index of refraction",
+            self.ior.to_string(),
+            "use a value above 1, up to 4",
+        )?;
+        let absorbs = self.absorption.is_finite() && self.absorption.min_element() >= 0.0;
+        check(absorbs, "absorption", self.absorption.to_string(), "use three finite values of at least 0")?;
+        let odd = self.window % 2 == 1 && (3..=Self::MAX_WINDOW).contains(&self.window);
+        check(odd, "window", self.window.to_string(), "use an odd number of pixels from 3 to 25")?;
+        check(self.iterations <= 20, "iterations", self.iterations.to_string(), "use 0 to 20")?;
+        check(
+            self.sigma.is_finite() && self.sigma > 0.0,
+            "sigma",
+            self.sigma.to_string(),
+            "use a finite value above 0, in particle radii",
+        )
+    }
+}
+
+/// A perspective camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// World to eye: a rotation and a translation.
+    pub view: Mat4,
+    /// Eye to Vulkan clip space (y down), perspective: w = -z. May be off-centre, jittered, reversed or infinite.
+    pub projection: Mat4,
+    /// Distance of the near plane, above 0. What is nearer is not drawn.
+    pub near: f32,
+    /// World direction in which the environment map's +y points.
+    pub up: Vec3,
+}
+
+impl Camera {
+    /// A camera at `eye` that looks at `target`, `fov_y` radians high.
+    pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, fov_y: f32, aspect: f32, near: f32) -> Camera {
+        use glam::camera::rh;
+        let projection = rh::proj::vulkan::perspective_infinite(fov_y, aspect, near);
+        Camera { view: rh::view::look_at_mat4(eye, target, up), projection, near, up }
+    }
+
+    /// Checks that this is a rigid view and a perspective projection.
+    pub fn validate(&self) -> Result<(), Error> {
+        let r = Mat3::from_mat4(self.view);
+        let rigid = (r * r.transpose()).abs_diff_eq(Mat3::IDENTITY, 1e-3)
+            && r.determinant() > 0.0
+            && self.view.is_finite()
+            && self.view.row(3).abs_diff_eq(Vec4::W, 1e-6);
+        if !rigid {
+            let remedy = "use a rotation and a translation; scale the scene instead, and keep eye, target and up apart";
+            return Err(Error::parameter("camera view", self.view, remedy));
+        }
+        let p = &self.projection;
+        let perspective = p.is_finite()
+            && p.row(3).abs_diff_eq(Vec4::new(0.0, 0.0, -1.0, 0.0), 1e-6)
+            && p.x_axis.x != 0.0
+            && p.y_axis.y != 0.0
+            && p.y_axis.x == 0.0
+            && p.x_axis.y == 0.0;
+        if !perspective {
+            return Err(Error::parameter("camera projection", p, "use a perspective projection with w = -z"));
+        }
+        if !(self.near > 0.0 && self.near.is_finite()) {
+            return Err(Error::parameter("near plane", self.near, "use a finite distance above 0"));
+        }
+        if !(self.up.is_finite() && self.up.length() > 0.0) {
+            return Err(Error::parameter("up", self.up, "use a finite direction that is not zero"));
+        }
+        Ok(())
+    }
+
+    /// The uniform block of a frame. `bounds` is the world box around the liquid.
+    pub(crate) fn uniforms(&self, settings: &Settings, size: [u32; 2], radius: f32, bounds: (Vec3, Vec3)) -> Frame {
+        let (w, h) = (size[0] as f32, size[1] as f32);
+        let p = &self.projection;
+        // pixel = (ndc + 1) / 2 * size and ndc = P v - P02 for v = (x/d, y/d, -1)
+        let to_pixel = Vec4::new(
+            p.x_axis.x * 0.5 * w,
+            p.y_axis.y * 0.5 * h,
+            (1.0 - p.z_axis.x) * 0.5 * w,
+            (1.0 - p.z_axis.y) * 0.5 * h,
+        );
+        let (low, high) = bounds;
+        let farthest = self.view.transform_point3(0.5 * (low + high)).length() + 0.5 * (high - low).length();
+        // A thousandth of a radius finds a root; a float's steps at the farthest depth are the floor below it.
+        let converged = (1e-3 * radius).max(1e-6 * farthest);
+        let to_up = Mat3::from_quat(glam::Quat::from_rotation_arc(self.up.normalize(), Vec3::Y));
+        Frame {
+            view: self.view,
+            eye_to_env: Mat4::from_mat3(to_up * Mat3::from_mat4(self.view).transpose()),
+            to_pixel,
+            viewport: Vec4::new(w, h, self.near, radius),
+            smoothing: Vec4::new(
+                settings.sigma * radius,
+                crate::shader::FIT_UPDATE_LIMIT * settings.sigma * radius,
+                crate::shader::FIT_GRAZING_LIMIT,
+                0.0,
+            ),
+            search: Vec4::new(converged, converged.max(Self::ACCEPTED * radius), Self::JUMP * radius, settings.ior),
+            absorption: settings.absorption.extend(0.0),
+            bounds_min: low.extend(0.0),
+            bounds_max: high.extend(0.0),
+            scene: Vec4::ZERO,
+            particles: UVec4::ZERO,
+        }
+    }
+
+    /// Largest |f| of an accepted hit, in particle radii.
+    pub const ACCEPTED: f32 = 0.05;
+    /// Largest spread of the depths around a sample that is still interpolated, in particle radii.
+    pub const JUMP: f32 = 2.0;
+}

@@ -1,0 +1,213 @@
+//! The table of everything a frame keeps in memory: name, format, size, and when it exists at all.
+
+use crate::{resources::ImageSpec, settings::Settings, shader};
+use ash::vk::{self, BufferUsageFlags as B, Format as F, ImageUsageFlags as U};
+
+/// Resources that passes name in their declarations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[allow(missing_docs)] // each is described where it is made, in `spec`
+pub enum Id {
+    FrameBlock,
+    Particles,
+    Bounds,
+    Visible,
+    Draws,
+    Counters,
+    SplatDepth,
+    SplashDepth,
+    SplashNormal,
+    BodyDepthRaw,
+    BodyNormalRaw,
+    BodyDepthA,
+    BodyDepthB,
+    BodyNormal,
+    Walk,
+    Direction,
+    Environment,
+    SceneColor,
+    SceneDepth,
+    Output,
+}
+
+impl Id {
+    /// Those the renderer makes for itself from [`Needs`], in the order of the memory ledger.
+    pub const OWN: [Id; 14] = [
+        Id::Bounds,
+        Id::Visible,
+        Id::Draws,
+        Id::Counters,
+        Id::SplatDepth,
+        Id::SplashDepth,
+        Id::SplashNormal,
+        Id::BodyDepthRaw,
+        Id::BodyNormalRaw,
+        Id::BodyDepthA,
+        Id::BodyDepthB,
+        Id::BodyNormal,
+        Id::Walk,
+        Id::Direction,
+    ];
+
+    /// Name in the ledger, in the printed barriers and (after "meniscus") in debuggers.
+    pub fn name(self) -> &'static str {
+        match self {
+            Id::FrameBlock => "frame block",
+            Id::Particles => "particles",
+            Id::Bounds => "body depth bounds",
+            Id::Visible => "visible particles",
+            Id::Draws => "indirect draws",
+            Id::Counters => "counters",
+            Id::SplatDepth => "splat depth test",
+            Id::SplashDepth => "splash depth",
+            Id::SplashNormal => "splash normal",
+            Id::BodyDepthRaw => "body depth (ray-cast)",
+            Id::BodyNormalRaw => "body normal (ray-cast)",
+            Id::BodyDepthA => "body depth (smoothed, odd)",
+            Id::BodyDepthB => "body depth (smoothed, even)",
+            Id::BodyNormal => "body normal (smoothed)",
+            Id::Walk => "walk (debug)",
+            Id::Direction => "final direction (debug)",
+            Id::Environment => "environment",
+            Id::SceneColor => "scene colour (host's)",
+            Id::SceneDepth => "scene depth (host's)",
+            Id::Output => "output (host's)",
+        }
+    }
+}
+
+/// What a frame has to draw: everything that decides which resources exist.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Splash particles.
+    pub splash: u32,
+    /// Body particles.
+    pub body: u32,
+    /// Front only, or front and back.
+    pub sides: u32,
+    /// Iterations of plane fitting.
+    pub iterations: u32,
+    /// Whether hidden particles are dropped before drawing.
+    pub occlusion: bool,
+    /// Whether the refraction pass also writes what each walk met.
+    pub debug: bool,
+}
+
+/// An image or a buffer, as it has to be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spec {
+    /// An image.
+    Image(ImageSpec),
+    /// A buffer of so many bytes in device memory.
+    Buffer {
+        /// Size.
+        bytes: u64,
+        /// Usage.
+        usage: B,
+    },
+}
+
+impl Needs {
+    /// What settings need for so many particles of each class.
+    pub fn new(size: [u32; 2], splash: usize, body: usize, settings: &Settings, debug: bool) -> Needs {
+        Needs {
+            size,
+            splash: splash as u32,
+            body: body as u32,
+            sides: if settings.refractions == 1 { 1 } else { 2 },
+            iterations: settings.iterations,
+            occlusion: settings.occlusion_culling,
+            debug,
+        }
+    }
+
+    /// The image that holds the body's smoothed depth: iterations alternate between two.
+    pub fn body_depth(&self) -> Id {
+        match self.iterations {
+            0 => Id::BodyDepthRaw,
+            n if n % 2 == 1 => Id::BodyDepthA,
+            _ => Id::BodyDepthB,
+        }
+    }
+
+    /// The image that holds the normals of the smoothed body.
+    pub fn body_normal(&self) -> Id {
+        if self.iterations == 0 { Id::BodyNormalRaw } else { Id::BodyNormal }
+    }
+
+    /// How a resource is made for this frame; `None` where the frame does without it.
+    pub fn spec(&self, id: Id) -> Option<Spec> {
+        let (splash, body) = (self.splash > 0, self.body > 0);
+        let any = splash || body;
+        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        let image = |format, layers, array, usage| {
+            Some(Spec::Image(ImageSpec { format, size: self.size, layers, array, usage }))
+        };
+        let buffer = |bytes, usage| {
+            Some(Spec::Buffer { bytes, usage: usage | B::STORAGE_BUFFER | B::TRANSFER_SRC | B::TRANSFER_DST })
+        };
+        // One layer a side: front, back.
+        let drawn = |format| image(format, self.sides, true, U::COLOR_ATTACHMENT | U::SAMPLED | U::TRANSFER_SRC);
+        let computed = |format| image(format, self.sides, true, U::STORAGE | U::SAMPLED | U::TRANSFER_SRC);
+        let placeholder =
+            |format| Some(Spec::Image(ImageSpec { format, size: [1, 1], layers: 1, array: true, usage: U::SAMPLED }));
+        match id {
+            // Two 32-bit bounds a pixel: nearest and farthest depth that the body certainly reaches.
+            Id::Bounds if body && self.occlusion => buffer(8 * pixels, B::empty()),
+            // A word a particle: the sides on which it shows.
+            Id::Visible if any => buffer(4 * u64::from(self.splash + self.body), B::empty()),
+            Id::Draws if any => buffer(2 * size_of::<shader::Draws>() as u64, B::INDIRECT_BUFFER),
+            Id::Counters if any => buffer(4 * u64::from(shader::COUNTERS), B::empty()),
+            // The depth test of whichever class and side is being drawn.
+            Id::SplatDepth if any => image(F::D32_SFLOAT, 1, false, U::DEPTH_STENCIL_ATTACHMENT),
+            Id::SplashDepth if splash => drawn(F::R32_SFLOAT),
+            Id::SplashNormal if splash => drawn(F::R32_UINT),
+            // With no particles at all the refraction pass still binds maps it does not look at.
+            Id::SplashDepth if !any => placeholder(F::R32_SFLOAT),
+            Id::SplashNormal if !any => placeholder(F::R32_UINT),
+            Id::BodyDepthRaw if body => drawn(F::R32_SFLOAT),
+            Id::BodyNormalRaw if body => drawn(F::R32_UINT),
+            Id::BodyDepthA if body && self.iterations >= 1 => computed(F::R32_SFLOAT),
+            Id::BodyDepthB if body && self.iterations >= 2 => computed(F::R32_SFLOAT),
+            Id::BodyNormal if body && self.iterations >= 1 => computed(F::R32_UINT),
+            Id::Walk | Id::Direction if self.debug => {
+                image(F::R32G32B32A32_SFLOAT, 1, false, U::COLOR_ATTACHMENT | U::TRANSFER_SRC)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// One line of the memory ledger.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LedgerEntry {
+    /// Resource name.
+    pub name: &'static str,
+    /// Device memory in bytes, as the driver requires it.
+    pub bytes: u64,
+}
+
+/// Memory that a frame with these needs takes, resource by resource, asked of the driver without allocating.
+pub(crate) fn ledger(device: &ash::Device, needs: &Needs) -> Vec<LedgerEntry> {
+    let entry = |id: Id| {
+        let spec = needs.spec(id)?;
+        let mut requirements = vk::MemoryRequirements2::default();
+        match spec {
+            Spec::Image(spec) => {
+                let create = spec.info();
+                let info = vk::DeviceImageMemoryRequirements::default().create_info(&create);
+                // SAFETY: core in 1.3; the create info is complete and outlives the call.
+                unsafe { device.get_device_image_memory_requirements(&info, &mut requirements) };
+            }
+            Spec::Buffer { bytes, usage } => {
+                let create = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+                let info = vk::DeviceBufferMemoryRequirements::default().create_info(&create);
+                // SAFETY: as above.
+                unsafe { device.get_device_buffer_memory_requirements(&info, &mut requirements) };
+            }
+        }
+        Some(LedgerEntry { name: id.name(), bytes: requirements.memory_requirements.size })
+    };
+    Id::OWN.into_iter().filter_map(entry).collect()
+}
