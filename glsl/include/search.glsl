@@ -127,6 +127,20 @@ float refine(Ray ray, int cls, int side, float sense, float a, float fa, float b
     return abs(f);
 }
 
+// Whether a ray stays inside up to t, looked at every few pixels: the secant method finds a wall, not the first.
+bool inside_until(Ray ray, int cls, int side, float sense, float t) {
+    vec2 p0 = project(ray.origin), p1 = project(ray.origin + t * ray.dir);
+    float d0 = -ray.origin.z, d1 = d0 - t * ray.dir.z;
+    float steps = clamp(ceil(distance(p0, p1) / CHECK_PIXELS), 1.0, float(CHECK_STEPS));
+    for (float i = 1.0; i < steps; ++i) {
+        float share = i / steps;
+        float wall = map_depth(cls, side, nearest(mix(p0, p1, share)));
+        float d = d0 * d1 / mix(d1, d0, share);
+        if (wall <= 0.0 || sense * (d - wall) > frame.search.y) return false;
+    }
+    return true;
+}
+
 // Where a ray inside a volume leaves it. First the secant method from the two ends that a flat wall would give;
 // if that leaves the ray, meets a hole or does not converge, a march of about a pixel a step, then regula falsi.
 // Returns an outcome; t is the hit, or the last point known to be inside.
@@ -142,7 +156,8 @@ int find_exit(Ray ray, int cls, bool from_wall, out float t) {
             float next = fb == fa ? b : b - fb * (b - a) / (fb - fa);
             if (abs(fb) <= frame.search.x) {
                 t = next; // the tolerance only has to find the root; the last step puts t on it
-                return OUTCOME_HIT;
+                if (inside_until(ray, cls, side, sense, t)) return OUTCOME_HIT;
+                break;
             }
             if (fb >= HOLE || !(next > 0.0 && next <= ray.reach)) break;
             a = b;

@@ -46,10 +46,13 @@
 
 // Plane fitting: below this |n.v| eq. (5) is not trusted; an update longer than this many sigma is not taken.
 #define FIT_GRAZING_LIMIT 0.01
-#define FIT_UPDATE_LIMIT 1.0
+#define FIT_UPDATE_LIMIT 4.0
 
-// Search along a ray: secant steps, steps of a march, refinements of a bracket.
+// Search along a ray: secant steps; pixels between the samples that look for an earlier wall, and how many of them at
+// most; steps of a march; refinements of a bracket.
 #define SECANT_STEPS 10
+#define CHECK_PIXELS 2.0
+#define CHECK_STEPS 16
 #define MARCH_STEPS 256
 #define REFINE_STEPS 24
 
