@@ -61,7 +61,7 @@ void main() {
 
     vec3 x = depth * v, color = vec3(0.0), light = vec3(1.0);
     float hits = 0.0, length_inside = 0.0, flipped = 0.0;
-    int outcome = OUTCOME_HIT, first = cls, second = -1;
+    int outcome = OUTCOME_HIT, doubt = OUTCOME_HIT, first = cls, second = -1;
     uint bounces = 0u;
     bool entering = !inside;
     const uint volumes = REFRACTIONS == 1 ? 1u : REFRACTIONS / 2u;
@@ -83,17 +83,23 @@ void main() {
         entering = true;
         if (REFRACTIONS == 1) break;
 
-        bool from_wall = false, outside = false;
+        int came_from = -1;
+        bool outside = false;
         while (!outside && outcome == OUTCOME_HIT) {
             float t;
-            Ray ray = trace(x, dir);
-            outcome = find_exit(ray, cls, from_wall, t);
+            int side;
+            int found = find_exit(trace(x, dir), cls, came_from, t, side);
+            if (found == OUTCOME_PAST_JUMP || found == OUTCOME_OTHER_WALL) {
+                doubt = doubt == OUTCOME_HIT ? found : doubt;
+                found = OUTCOME_HIT;
+            }
+            outcome = found;
             x += t * dir;
             length_inside += t;
             light *= exp(-frame.absorption.rgb * t);
             if (outcome != OUTCOME_HIT) break;
             hits += 1.0;
-            vec3 n = sample_normal(cls, ray.dir.z <= 0.0 ? SIDE_BACK : SIDE_FRONT, project(x));
+            vec3 n = sample_normal(cls, side, project(x));
             if (dot(dir, n) < 0.0) {
                 n = -n;
                 flipped += 1.0;
@@ -108,7 +114,7 @@ void main() {
             } else {
                 // Beyond the critical angle all of it stays inside.
                 dir = mirrored;
-                from_wall = true;
+                came_from = side;
                 if (bounces == INTERNAL_REFLECTIONS) outcome = OUTCOME_REFLECTION_LIMIT;
                 ++bounces;
             }
@@ -116,8 +122,9 @@ void main() {
         if (outcome != OUTCOME_HIT || volume + 1u == volumes) break;
 
         float t;
-        bool unknown;
-        int next = find_entry(trace(x, dir), t, unknown);
+        bool unknown, jumped;
+        int next = find_entry(trace(x, dir), t, unknown, jumped);
+        if (jumped && doubt == OUTCOME_HIT) doubt = OUTCOME_PAST_JUMP;
         if (next < 0) {
             if (unknown) outcome = OUTCOME_LEFT_VIEW;
             break;
@@ -127,5 +134,5 @@ void main() {
     }
     color += light * background(x, dir);
     int pattern = second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + second;
-    finish(color, pattern, outcome, hits, length_inside, dir, flipped);
+    finish(color, pattern, outcome == OUTCOME_HIT ? doubt : outcome, hits, length_inside, dir, flipped);
 }

@@ -20,7 +20,8 @@ Ellipsoid to_eye(Particle p) {
 }
 
 // Interval of x/d over the ellipsoid for one lateral axis: the two planes through the eye that touch it.
-// With v = c/dc + u: u^2 (dc^2 - szz) - 2 u (sxz + c szz/dc) - (sxx + 2 c/dc sxz + (c/dc)^2 szz) = 0.
+// A plane x = v d has the normal n = (1, 0, v), touches where (n.c)^2 = n^T S n, and with v = c/dc + u, n.c = -u dc:
+// u^2 (dc^2 - szz) - 2 u (sxz + c/dc szz) - (sxx + 2 c/dc sxz + (c/dc)^2 szz) = 0.
 vec2 tangent_interval(float c, float dc, float sxx, float sxz, float szz) {
     float v = c / dc;
     float alpha = sxx + v * (2.0 * sxz + v * szz);
@@ -44,8 +45,8 @@ vec4 pixel_bounds(Ellipsoid e) {
     if (dc + reach <= near) return vec4(1.0, 1.0, 0.0, 0.0);
     vec2 x, y;
     if (dc - reach > near) {
-        x = tangent_interval(e.center.x, dc, e.sd.x, -e.sm.y, e.sd.z);
-        y = tangent_interval(e.center.y, dc, e.sd.y, -e.sm.z, e.sd.z);
+        x = tangent_interval(e.center.x, dc, e.sd.x, e.sm.y, e.sd.z);
+        y = tangent_interval(e.center.y, dc, e.sd.y, e.sm.z, e.sd.z);
     } else {
         x = crossing_interval(e.center.x, sqrt(e.sd.x), dc + reach);
         y = crossing_interval(e.center.y, sqrt(e.sd.y), dc + reach);

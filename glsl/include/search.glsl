@@ -127,37 +127,57 @@ float refine(Ray ray, int cls, int side, float sense, float a, float fa, float b
     return abs(f);
 }
 
-// Whether a ray stays inside up to t, looked at every few pixels: the secant method finds a wall, not the first.
-bool inside_until(Ray ray, int cls, int side, float sense, float t) {
+// How a ray stands in a volume between its two maps: the wall it runs towards and, behind its back, the other one.
+struct Walls {
+    int ahead;   // side of the map ahead: back for a ray going away, front for one coming back
+    float sense; // sign of f for the wall ahead; the other wall has the opposite
+};
+
+// What a look at every few pixels up to t finds: the secant method finds a wall, not necessarily the first.
+const int CLEAR = 0;    // inside all the way
+const int JUMPED = 1;   // inside, but the map ahead jumps: what stands there may hide another wall
+const int BLOCKED = 2;  // outside somewhere, by either wall
+int look_until(Ray ray, int cls, Walls walls, float t) {
     vec2 p0 = project(ray.origin), p1 = project(ray.origin + t * ray.dir);
     float d0 = -ray.origin.z, d1 = d0 - t * ray.dir.z;
     float steps = clamp(ceil(distance(p0, p1) / CHECK_PIXELS), 1.0, float(CHECK_STEPS));
-    for (float i = 1.0; i < steps; ++i) {
+    float before = map_depth(cls, walls.ahead, nearest(p0));
+    float jump = frame.search.z * (1.0 + distance(p0, p1) / steps);
+    int found = CLEAR;
+    for (float i = 1.0; i <= steps; ++i) {
         float share = i / steps;
-        float wall = map_depth(cls, side, nearest(mix(p0, p1, share)));
+        ivec2 pixel = nearest(mix(p0, p1, share));
+        float wall = map_depth(cls, walls.ahead, pixel), other = map_depth(cls, 1 - walls.ahead, pixel);
         float d = d0 * d1 / mix(d1, d0, share);
-        if (wall <= 0.0 || sense * (d - wall) > frame.search.y) return false;
+        if (i < steps && (wall <= 0.0 || walls.sense * (d - wall) > frame.search.y)) return BLOCKED;
+        if (other > 0.0 && walls.sense * (other - d) > frame.search.y) return BLOCKED;
+        if (abs(wall - before) > jump) found = JUMPED;
+        before = wall;
     }
-    return true;
+    return found;
 }
 
 // Where a ray inside a volume leaves it. First the secant method from the two ends that a flat wall would give;
-// if that leaves the ray, meets a hole or does not converge, a march of about a pixel a step, then regula falsi.
-// Returns an outcome; t is the hit, or the last point known to be inside.
-int find_exit(Ray ray, int cls, bool from_wall, out float t) {
-    int side = ray.dir.z <= 0.0 ? SIDE_BACK : SIDE_FRONT;
-    float sense = side == SIDE_BACK ? 1.0 : -1.0, speed = abs(ray.dir.z);
+// if that leaves the ray, meets a hole or does not converge, a march of half a pixel a step, then regula falsi.
+// A ray can also leave through the other wall: the map behind its back, which then lies across its way.
+// `came_from`: the map off which the ray was reflected, or -1: there f starts at zero, and the secant would stay.
+// Returns an outcome; t is the hit, or the last point known to be inside; `side` the map that was hit.
+int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
+    Walls walls = ray.dir.z <= 0.0 ? Walls(SIDE_BACK, 1.0) : Walls(SIDE_FRONT, -1.0);
+    side = walls.ahead;
     t = 0.0;
-    float fa = wall_distance(ray, cls, side, 0.0, sense);
-    if (!from_wall && fa < 0.0) {
-        float a = 0.0, b = min(-fa / max(speed, 1e-6), ray.reach), fb = 0.0;
+    bool on_wall = came_from == walls.ahead;
+    float fa = wall_distance(ray, cls, side, 0.0, walls.sense);
+    if (!on_wall && fa < 0.0) {
+        float a = 0.0, b = min(-fa / max(abs(ray.dir.z), 1e-6), ray.reach), fb = 0.0;
         for (int i = 0; i < SECANT_STEPS; ++i) {
-            fb = wall_distance(ray, cls, side, b, sense);
+            fb = wall_distance(ray, cls, side, b, walls.sense);
             float next = fb == fa ? b : b - fb * (b - a) / (fb - fa);
             if (abs(fb) <= frame.search.x) {
                 t = next; // the tolerance only has to find the root; the last step puts t on it
-                if (inside_until(ray, cls, side, sense, t)) return OUTCOME_HIT;
-                break;
+                int found = look_until(ray, cls, walls, t);
+                if (found == BLOCKED) break;
+                return found == CLEAR ? OUTCOME_HIT : OUTCOME_PAST_JUMP;
             }
             if (fb >= HOLE || !(next > 0.0 && next <= ray.reach)) break;
             a = b;
@@ -165,70 +185,103 @@ int find_exit(Ray ray, int cls, bool from_wall, out float t) {
             b = next;
         }
     }
-    bool inside = !from_wall;
-    float steps = clamp(ceil(ray.span), 1.0, float(MARCH_STEPS));
-    float share = min(1.0 / max(ray.span, 1e-6), 1.0);
-    // Off a wall the first sample is close to it: within the first pixel the ray is inside or it is nowhere.
-    float first = from_wall ? 0.05 * share : 0.0;
-    float last = 0.0, f_last = -1.0;
-    for (float i = from_wall ? 0.0 : 1.0; i <= steps; ++i) {
-        float next = pixel_to_t(ray, min(max(i * share, first), 1.0));
-        float f = wall_distance(ray, cls, side, next, sense);
+    // The march: four times as far at a stride while both walls are far, back to half a pixel when one comes near.
+    float fine = min(MARCH_PIXELS / max(ray.span, 1e-6), 1.0);
+    vec2 p0 = project(ray.origin), p1 = project(ray.origin + ray.reach * ray.dir);
+    float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);
+    bool inside = !on_wall, jumped = false;
+    float at = 0.0, last = 0.0, f_last = -1.0, other_last = -1.0, wall_last = 0.0;
+    // Off a wall the first sample is close to it: within two pixels the ray is inside or it is nowhere.
+    float stride = on_wall ? 0.1 * fine : fine;
+    for (int i = 0; i < MARCH_STEPS && at < 1.0; ++i) {
+        float way = min(at + stride, 1.0);
+        ivec2 pixel = nearest(mix(p0, p1, way));
+        float d = 1.0 / mix(k0, k1, way), next = pixel_to_t(ray, way);
+        float wall = map_depth(cls, walls.ahead, pixel), behind = map_depth(cls, 1 - walls.ahead, pixel);
+        float f = wall > 0.0 ? walls.sense * (d - wall) : HOLE;
+        float other = behind > 0.0 ? walls.sense * (behind - d) : HOLE;
+        // A pixel's own depth tells which walls are near enough to look closely.
+        bool near = f > -0.5 * frame.search.z, other_near = other > -0.5 * frame.search.z && other < HOLE;
+        if (stride > fine && (near || other_near)) {
+            stride = fine;
+            continue;
+        }
+        if (near) f = wall_distance(ray, cls, walls.ahead, next, walls.sense);
+        if (other_near) other = wall_distance(ray, cls, 1 - walls.ahead, next, -walls.sense);
+        if (other > frame.search.y && other < HOLE) {
+            if (refine(ray, cls, 1 - walls.ahead, -walls.sense, last, min(other_last, 0.0), next, other, t) <= frame.search.y) {
+                side = 1 - walls.ahead;
+                return OUTCOME_OTHER_WALL;
+            }
+            t = last;
+            return OUTCOME_HOLE;
+        }
         if (f < 0.0) {
+            jumped = jumped || (wall_last > 0.0 && abs(wall - wall_last) > frame.search.z * (1.0 + MARCH_PIXELS * stride / fine));
             inside = true;
             last = next;
             f_last = f;
+            other_last = other < HOLE ? other : -1.0;
+            wall_last = wall;
         } else if (inside) {
-            float residual = refine(ray, cls, side, sense, last, f_last, next, f, t);
-            if (residual <= frame.search.y) return OUTCOME_HIT;
+            float residual = refine(ray, cls, walls.ahead, walls.sense, last, f_last, next, f, t);
+            if (residual <= frame.search.y) return jumped ? OUTCOME_PAST_JUMP : OUTCOME_HIT;
             t = last;
             return OUTCOME_HOLE;
-        } else if (i >= 2.0) {
+        } else if (way >= 4.0 * fine) {
             return OUTCOME_HOLE;
         }
+        at = way;
+        stride = near || other_near ? fine : 4.0 * fine;
     }
     t = last;
-    if (ray.span > float(MARCH_STEPS)) return OUTCOME_NOT_CONVERGED;
+    if (at < 1.0) return OUTCOME_NOT_CONVERGED;
     return ray.leaves ? OUTCOME_LEFT_VIEW : OUTCOME_HOLE;
 }
 
-// A crossing of one class's front map within one step of a march, from in front to behind, without a jump.
-bool crosses_front(Ray ray, int cls, float a, float b, out float t) {
-    float fa = wall_distance(ray, cls, SIDE_FRONT, a, 1.0), fb = wall_distance(ray, cls, SIDE_FRONT, b, 1.0);
-    t = b;
-    if (!(fa < 0.0) || !(fb >= 0.0)) return false;
-    return refine(ray, cls, SIDE_FRONT, 1.0, a, fa, b, fb, t) <= frame.search.y;
+// The first crossing of a class's front map, from in front to behind and without a jump, within half a step of `middle`
+// (shares of the ray's way across the screen): looked for at quarters of the step, then refined. Sets `jumped` where
+// the ray passes behind a surface without crossing it.
+bool crosses_front(Ray ray, int cls, float middle, float step, out float t, inout bool jumped) {
+    float a = 0.0, fa = HOLE;
+    t = 0.0;
+    for (int k = -2; k <= 2; ++k) {
+        float b = pixel_to_t(ray, clamp(middle + 0.25 * float(k) * step, 0.0, 1.0));
+        float fb = wall_distance(ray, cls, SIDE_FRONT, b, 1.0);
+        if (fa < 0.0 && fb >= 0.0 && fb < HOLE) {
+            if (refine(ray, cls, SIDE_FRONT, 1.0, a, fa, b, fb, t) <= frame.search.y) return true;
+            jumped = true;
+        }
+        a = b;
+        fa = fb;
+    }
+    return false;
 }
 
 // The nearest front surface of either class that a ray outside meets, or -1. Sets `unknown` where the ray left the
-// view, or ran out of steps, before it left the liquid's box.
-int find_entry(Ray ray, out float t, out bool unknown) {
-    float steps = clamp(ceil(ray.span), 1.0, float(MARCH_STEPS));
-    float share = ray.span > float(MARCH_STEPS) ? 1.0 / ray.span : 1.0 / steps;
-    unknown = ray.leaves || ray.span > float(MARCH_STEPS);
+// view, or ran out of steps, before it left the liquid's box, and `jumped` where it passed behind a surface unseen.
+int find_entry(Ray ray, out float t, out bool unknown, out bool jumped) {
+    jumped = false;
+    float steps = clamp(ceil(ray.span / MARCH_PIXELS), 1.0, float(MARCH_STEPS));
+    float share = min(MARCH_PIXELS / max(ray.span, 1e-6), 1.0);
+    unknown = ray.leaves || steps * share < 1.0;
     vec2 p0 = project(ray.origin), p1 = project(ray.origin + ray.reach * ray.dir);
     float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);
-    // Last f of each class; positive where there is no surface, so that only a way from in front counts.
-    vec2 before = vec2(HOLE);
-    float last = 0.0;
+    float low = -ray.origin.z;
     for (float i = 0.0; i <= steps; ++i) {
-        ivec2 pixel = nearest(mix(p0, p1, i * share));
-        float d = 1.0 / mix(k0, k1, i * share);
-        vec2 now = vec2(HOLE);
-        if (HAS_SPLASH) {
-            float front = map_depth(CLASS_SPLASH, SIDE_FRONT, pixel);
-            if (front > 0.0) now.x = d - front;
-        }
-        if (HAS_BODY) {
-            float front = map_depth(CLASS_BODY, SIDE_FRONT, pixel);
-            if (front > 0.0) now.y = d - front;
-        }
-        float next = pixel_to_t(ray, i * share);
-        bvec2 crossing = bvec2(before.x < 0.0 && now.x >= 0.0 && now.x < HOLE, before.y < 0.0 && now.y >= 0.0 && now.y < HOLE);
-        if (any(crossing)) {
-            float t_splash, t_body;
-            bool splash = crossing.x && crosses_front(ray, CLASS_SPLASH, last, next, t_splash);
-            bool body = crossing.y && crosses_front(ray, CLASS_BODY, last, next, t_body);
+        // One fetch a step and class tells whether a surface is near enough to look closely: within half the spread
+        // that is interpolated, of the depths the ray has in this step.
+        ivec2 pixel = nearest(mix(p0, p1, min(i * share, 1.0)));
+        float high = 1.0 / mix(k0, k1, min((i + 0.5) * share, 1.0));
+        float front_splash = HAS_SPLASH ? map_depth(CLASS_SPLASH, SIDE_FRONT, pixel) : 0.0;
+        float front_body = HAS_BODY ? map_depth(CLASS_BODY, SIDE_FRONT, pixel) : 0.0;
+        float from = min(low, high) - 0.5 * frame.search.z, to = max(low, high) + 0.5 * frame.search.z;
+        low = high;
+        bool splash = front_splash >= from && front_splash <= to, body = front_body >= from && front_body <= to;
+        if (splash || body) {
+            float t_splash = 0.0, t_body = 0.0;
+            splash = splash && crosses_front(ray, CLASS_SPLASH, i * share, share, t_splash, jumped);
+            body = body && crosses_front(ray, CLASS_BODY, i * share, share, t_body, jumped);
             if (splash || body) {
                 bool first = splash && (!body || t_splash <= t_body);
                 t = first ? t_splash : t_body;
@@ -236,8 +289,6 @@ int find_entry(Ray ray, out float t, out bool unknown) {
                 return first ? CLASS_SPLASH : CLASS_BODY;
             }
         }
-        before = now;
-        last = next;
     }
     t = 0.0;
     return -1;

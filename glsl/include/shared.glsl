@@ -21,13 +21,16 @@
 #define PATTERN_BODY_SPLASH 5
 #define PATTERN_BODY_BODY 6
 
-// How a pixel's walk ended.
+// How a pixel's walk ended. Past a jump: every surface was found, but on the way to one the map ahead jumped, and an
+// unseen wall may stand before it. Other wall: every surface was found, one of them across the ray's way.
 #define OUTCOME_NO_LIQUID 0
 #define OUTCOME_HIT 1
 #define OUTCOME_LEFT_VIEW 2
 #define OUTCOME_HOLE 3
 #define OUTCOME_NOT_CONVERGED 4
 #define OUTCOME_REFLECTION_LIMIT 5
+#define OUTCOME_PAST_JUMP 6
+#define OUTCOME_OTHER_WALL 7
 
 // Which particles a class draws on which side; bits of the cull pass's verdict.
 #define VISIBLE_FRONT 1
@@ -49,11 +52,12 @@
 #define FIT_UPDATE_LIMIT 4.0
 
 // Search along a ray: secant steps; pixels between the samples that look for an earlier wall, and how many of them at
-// most; steps of a march; refinements of a bracket.
+// most; pixels a step of a march, and its steps at most; refinements of a bracket.
 #define SECANT_STEPS 10
 #define CHECK_PIXELS 2.0
 #define CHECK_STEPS 16
-#define MARCH_STEPS 256
+#define MARCH_PIXELS 0.5
+#define MARCH_STEPS 1024
 #define REFINE_STEPS 24
 
 // One particle: eye-independent, as drawn.
