@@ -155,8 +155,9 @@ impl Camera {
         Ok(())
     }
 
-    /// The uniform block of a frame. `bounds` is the world box around the liquid.
-    pub(crate) fn uniforms(&self, settings: &Settings, size: [u32; 2], radius: f32, bounds: (Vec3, Vec3)) -> Frame {
+    /// The uniform block of a frame, as shaders and twins read it. `size` in pixels, `radius` and `bounds` (the box
+    /// around the liquid) in world units. Host scene and particle counts are left zero.
+    pub fn uniforms(&self, settings: &Settings, size: [u32; 2], radius: f32, bounds: (Vec3, Vec3)) -> Frame {
         let (w, h) = (size[0] as f32, size[1] as f32);
         let p = &self.projection;
         // pixel = (ndc + 1) / 2 * size and ndc = P v - P02 for v = (x/d, y/d, -1)

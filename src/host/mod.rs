@@ -1,6 +1,7 @@
 //! A small Vulkan host: what the command line, the tests and the examples need to call the library as any engine
 //! would. An engine has all of this already; only the feature `host` compiles it.
 
+mod session;
 mod validation;
 
 use crate::{Error, device};
@@ -9,6 +10,7 @@ use gpu_allocator::{
     MemoryLocation,
     vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc},
 };
+pub use session::Session;
 use std::sync::{Arc, Mutex};
 pub use validation::Messages;
 
@@ -169,8 +171,9 @@ impl Instance {
             vk::PhysicalDeviceType::DISCRETE_GPU => (0, "discrete GPU"),
             vk::PhysicalDeviceType::INTEGRATED_GPU => (1, "integrated GPU"),
             vk::PhysicalDeviceType::VIRTUAL_GPU => (2, "virtual GPU"),
-            vk::PhysicalDeviceType::CPU => (3, "CPU"),
-            _ => (4, "other"),
+            vk::PhysicalDeviceType::CPU if driver.driver_id == vk::DriverId::MESA_LLVMPIPE => (3, "CPU"),
+            vk::PhysicalDeviceType::CPU => (4, "CPU"),
+            _ => (5, "other"),
         };
         let text = |s: Result<&std::ffi::CStr, _>| {
             s.map(|s: &std::ffi::CStr| s.to_string_lossy().into_owned()).unwrap_or_default()

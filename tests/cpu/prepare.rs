@@ -21,9 +21,7 @@ struct Random(u64);
 impl Random {
     fn next(&mut self) -> u32 {
         let Self(state) = self;
-        *state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (*state >> 33) as u32
     }
 
@@ -54,20 +52,14 @@ fn block(low: [i32; 3], high: [i32; 3]) -> Vec<Vec3> {
     let mut points = Vec::new();
     for x in low[0]..=high[0] {
         for y in low[1]..=high[1] {
-            points
-                .extend((low[2]..=high[2]).map(|z| 2.0 * Vec3::new(x as f32, y as f32, z as f32)));
+            points.extend((low[2]..=high[2]).map(|z| 2.0 * Vec3::new(x as f32, y as f32, z as f32)));
         }
     }
     points
 }
 
 fn input(positions: &[Vec3], radius: f32) -> Input<'_> {
-    Input {
-        positions,
-        radius,
-        classes: None,
-        ellipsoids: None,
-    }
+    Input { positions, radius, classes: None, ellipsoids: None }
 }
 
 fn run(positions: &[Vec3], radius: f32) -> (Particles, Report) {
@@ -79,10 +71,7 @@ fn bits(particles: &Particles) -> (usize, Vec<[u32; 12]>) {
         let columns = [e.center, e.axes.x_axis, e.axes.y_axis, e.axes.z_axis];
         std::array::from_fn(|i| columns[i / 3][i % 3].to_bits())
     };
-    (
-        particles.splash_count,
-        particles.ellipsoids.iter().map(bits).collect(),
-    )
+    (particles.splash_count, particles.ellipsoids.iter().map(bits).collect())
 }
 
 #[test]
@@ -94,16 +83,9 @@ fn shuffled_input_gives_the_same_bits() {
     cloud.extend_from_within(..40);
     cloud.extend(block([-9, 10, -9], [-6, 13, -6])); // equal coordinates within a cell
     let reference = bits(&run(&cloud, 1.0).0);
-    assert!(
-        reference.0 > 50 && reference.0 < 400,
-        "both classes occur: {}",
-        reference.0
-    );
+    assert!(reference.0 > 50 && reference.0 < 400, "both classes occur: {}", reference.0);
     for search in SEARCHES {
-        let options = Options {
-            search,
-            ..Options::default()
-        };
+        let options = Options { search, ..Options::default() };
         let shuffled = random.shuffled(&cloud);
         assert_ne!(shuffled, cloud);
         let (particles, _) = prepare(&input(&shuffled, 1.0), &options).unwrap();
@@ -112,28 +94,15 @@ fn shuffled_input_gives_the_same_bits() {
     // Duplicates that differ in class or ellipsoid are told apart.
     let given: Vec<(Vec3, Class, Mat3)> = (0..200)
         .map(|i| {
-            let class = if i % 3 == 0 {
-                Class::Splash
-            } else {
-                Class::Body
-            };
-            (
-                cloud[i % 20],
-                class,
-                Mat3::from_diagonal(Vec3::new(1.0, 1.0 + i as f32, 2.0)),
-            )
+            let class = if i % 3 == 0 { Class::Splash } else { Class::Body };
+            (cloud[i % 20], class, Mat3::from_diagonal(Vec3::new(1.0, 1.0 + i as f32, 2.0)))
         })
         .collect();
     let prepared = |given: &[(Vec3, Class, Mat3)]| {
         let positions: Vec<_> = given.iter().map(|g| g.0).collect();
         let classes: Vec<_> = given.iter().map(|g| g.1).collect();
         let axes: Vec<_> = given.iter().map(|g| g.2).collect();
-        let input = Input {
-            positions: &positions,
-            radius: 1.0,
-            classes: Some(&classes),
-            ellipsoids: Some(&axes),
-        };
+        let input = Input { positions: &positions, radius: 1.0, classes: Some(&classes), ellipsoids: Some(&axes) };
         bits(&prepare(&input, &Options::default()).unwrap().0)
     };
     assert!(prepared(&given) == prepared(&random.shuffled(&given)));
@@ -145,50 +114,23 @@ fn given_classes_and_ellipsoids_are_used() {
     let classes = [Class::Body, Class::Splash, Class::Body];
     let skewed = Mat3::from_cols(Vec3::X, Vec3::new(0.5, -2.0, 0.0), Vec3::Z * 1e-3);
     let axes = [skewed, Mat3::ZERO, skewed * 2.0];
-    let given = Input {
-        positions: &positions,
-        radius: 1.0,
-        classes: Some(&classes),
-        ellipsoids: None,
-    };
+    let given = Input { positions: &positions, radius: 1.0, classes: Some(&classes), ellipsoids: None };
     let (particles, report) = prepare(&given, &Options::default()).unwrap();
-    assert_eq!(
-        report,
-        Report {
-            splash: 1,
-            body: 2,
-            few_neighbours: 2,
-            ..Report::default()
-        }
-    );
+    assert_eq!(report, Report { splash: 1, body: 2, few_neighbours: 2, ..Report::default() });
     assert_eq!(particles.ellipsoids[0].center, Vec3::ZERO);
 
-    let given = Input {
-        ellipsoids: Some(&axes),
-        ..given
-    };
+    let given = Input { ellipsoids: Some(&axes), ..given };
     let (particles, _) = prepare(&given, &Options::default()).unwrap();
-    let expected = [
-        (positions[1], Mat3::IDENTITY),
-        (positions[2], axes[2]),
-        (positions[0], axes[0]),
-    ];
+    let expected = [(positions[1], Mat3::IDENTITY), (positions[2], axes[2]), (positions[0], axes[0])];
     for (center, axes) in expected {
         assert!(particles.ellipsoids.contains(&Ellipsoid { center, axes }));
     }
     assert_eq!(particles.radius, 1.0);
 
-    for bad in [
-        Mat3::ZERO,
-        Mat3::NAN,
-        Mat3::from_cols(Vec3::X, Vec3::X, Vec3::Z),
-    ] {
+    for bad in [Mat3::ZERO, Mat3::NAN, Mat3::from_cols(Vec3::X, Vec3::X, Vec3::Z)] {
         // The second is a splash and ignored; the third comes first in canonical order.
         for (axes, index) in [([skewed, bad, bad], 2), ([bad, bad, bad], 0)] {
-            let given = Input {
-                ellipsoids: Some(&axes),
-                ..given
-            };
+            let given = Input { ellipsoids: Some(&axes), ..given };
             let error = prepare(&given, &Options::default()).err();
             assert_eq!(error, Some(PrepareError::Ellipsoid { index }));
         }
@@ -201,87 +143,26 @@ fn errors_name_what_is_wrong() {
     let fails = |input: &Input, options: &Options| prepare(input, options).err().unwrap();
     let defaults = Options::default();
     for radius in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(
-            fails(&input(&points[..2], radius), &defaults),
-            PrepareError::Radius(_)
-        ));
+        assert!(matches!(fails(&input(&points[..2], radius), &defaults), PrepareError::Radius(_)));
     }
     let error = fails(&input(&points, 1.0), &defaults);
     assert!(matches!(error, PrepareError::Position { index: 2, .. }));
-    assert!(
-        error.to_string().starts_with("particle 2 at [0, NaN, 0]"),
-        "{error}"
-    );
-    let short = Input {
-        classes: Some(&[Class::Body]),
-        ..input(&points[..2], 1.0)
-    };
-    let expected = PrepareError::Length {
-        what: "classes",
-        found: 1,
-        particles: 2,
-    };
+    assert!(error.to_string().starts_with("particle 2 at [0, NaN, 0]"), "{error}");
+    let short = Input { classes: Some(&[Class::Body]), ..input(&points[..2], 1.0) };
+    let expected = PrepareError::Length { what: "classes", found: 1, particles: 2 };
     assert_eq!(fails(&short, &defaults), expected);
-    let short = Input {
-        ellipsoids: Some(&[]),
-        ..input(&points[..2], 1.0)
-    };
-    assert!(matches!(
-        fails(&short, &defaults),
-        PrepareError::Length {
-            what: "ellipsoids",
-            ..
-        }
-    ));
+    let short = Input { ellipsoids: Some(&[]), ..input(&points[..2], 1.0) };
+    assert!(matches!(fails(&short, &defaults), PrepareError::Length { what: "ellipsoids", .. }));
     for (name, options) in [
-        (
-            "support",
-            Options {
-                support: Some(1.9),
-                ..defaults
-            },
-        ),
-        (
-            "support",
-            Options {
-                support: Some(f32::NAN),
-                ..defaults
-            },
-        ),
-        (
-            "splash_threshold",
-            Options {
-                splash_threshold: f32::NAN,
-                ..defaults
-            },
-        ),
-        (
-            "smoothing",
-            Options {
-                smoothing: 1.1,
-                ..defaults
-            },
-        ),
-        (
-            "max_ratio",
-            Options {
-                max_ratio: 0.5,
-                ..defaults
-            },
-        ),
-        (
-            "max_semi_axis",
-            Options {
-                max_semi_axis: 0.0,
-                ..defaults
-            },
-        ),
+        ("support", Options { support: Some(1.9), ..defaults }),
+        ("support", Options { support: Some(f32::NAN), ..defaults }),
+        ("splash_threshold", Options { splash_threshold: f32::NAN, ..defaults }),
+        ("smoothing", Options { smoothing: 1.1, ..defaults }),
+        ("max_ratio", Options { max_ratio: 0.5, ..defaults }),
+        ("max_semi_axis", Options { max_semi_axis: 0.0, ..defaults }),
     ] {
         let error = fails(&input(&points[..2], 1.0), &options);
-        assert!(
-            matches!(error, PrepareError::Option { name: n, .. } if n == name),
-            "{error}"
-        );
+        assert!(matches!(error, PrepareError::Option { name: n, .. } if n == name), "{error}");
     }
 }
 

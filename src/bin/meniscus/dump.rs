@@ -1,9 +1,10 @@
 //! `--dump`: every intermediate target as .npy, so that any pass can be recomputed from the dump alone.
 
-use crate::{codes, render::Job, session::Session};
+use crate::{codes, render::Job};
 use glam::{DMat4, DVec3, Mat4};
 use meniscus::{
     Fresnel, Weighting,
+    host::Session,
     io::images::write_file,
     shader::{SIDE_BACK, SIDE_FRONT},
     targets::Id,

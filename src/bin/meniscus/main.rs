@@ -6,7 +6,6 @@ mod dump;
 mod info;
 mod render;
 mod scene;
-mod session;
 mod stats;
 
 use clap::{Parser, Subcommand};

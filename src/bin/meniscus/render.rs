@@ -4,14 +4,13 @@ use crate::{
     camera::{self, View},
     dump,
     scene::{Scene, Source},
-    session::Session,
     stats,
 };
 use clap::ValueEnum;
 use glam::{DVec3, Vec3};
 use meniscus::{
     Camera, Equirect, FrameInput, Fresnel, Settings, Weighting,
-    host::{Gpu, Instance},
+    host::{Gpu, Instance, Session},
     io::images,
 };
 use std::{error::Error, path::PathBuf, process::ExitCode};

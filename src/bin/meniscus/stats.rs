@@ -1,7 +1,8 @@
 //! `--stats`: timings, memory, counts, and everything needed to repeat the run.
 
-use crate::{codes, dump, render::Job, session::Session};
+use crate::{codes, dump, render::Job};
 use meniscus::{
+    host::Session,
     io::images::write_file,
     profile::FrameTimes,
     targets::{Id, LedgerEntry},

@@ -12,21 +12,10 @@ use super::{Random, block, run};
 fn spline_and_lattice_have_their_closed_values() {
     assert_eq!([0.0, 0.5, 1.0, 2.0].map(spline), [1.0, 0.25, 0.0, 0.0]);
     let slope = (spline(0.5 + 1e-6) - spline(0.5 - 1e-6)) / 2e-6;
-    assert!(
-        (slope + 1.5).abs() < 1e-5,
-        "both pieces meet smoothly: {slope}"
-    );
+    assert!((slope + 1.5).abs() < 1e-5, "both pieces meet smoothly: {slope}");
     // Shells of the cubic lattice within 4 radii: 1, 6, 12, 8.
-    let shells = [
-        (0.0, 1.0),
-        (2.0, 6.0),
-        (8f64.sqrt(), 12.0),
-        (12f64.sqrt(), 8.0),
-    ];
-    let sum: f64 = shells
-        .map(|(d, count)| count * spline(d / 4.0))
-        .iter()
-        .sum();
+    let shells = [(0.0, 1.0), (2.0, 6.0), (8f64.sqrt(), 12.0), (12f64.sqrt(), 8.0)];
+    let sum: f64 = shells.map(|(d, count)| count * spline(d / 4.0)).iter().sum();
     assert!((rest_density(4.0) - sum).abs() < 1e-12);
     assert_eq!(lattice(4.0).count(), 27);
     // The continuum's value: reach² / 3 · ∫ q⁴(1 - q³) / ∫ q²(1 - q³) = 0.15 reach².
@@ -47,18 +36,12 @@ fn density_is_one_inside_and_nothing_outside() {
     }
     // One radius above the outermost centres lies the surface; there the mean is one half.
     let plane = (0..100).map(|k| Vec3::new(0.2 * (k / 10) as f32, 0.2 * (k % 10) as f32, 9.0));
-    let surface: f32 = plane
-        .map(|point| field.relative_density(point))
-        .sum::<f32>()
-        / 100.0;
+    let surface: f32 = plane.map(|point| field.relative_density(point)).sum::<f32>() / 100.0;
     assert!((surface - 0.5).abs() < 0.01, "surface: {surface}");
     for point in [Vec3::Z * 12.0, Vec3::splat(1e30), Vec3::NAN, Vec3::INFINITY] {
         assert_eq!(field.relative_density(point), 0.0);
     }
-    let far = cube
-        .iter()
-        .map(|p| p + Vec3::new(-1e6, 1e6, 0.0))
-        .collect::<Vec<_>>();
+    let far = cube.iter().map(|p| p + Vec3::new(-1e6, 1e6, 0.0)).collect::<Vec<_>>();
     let field = DensityField::new(&far, 1.0, &Options::default()).unwrap();
     assert!((field.relative_density(Vec3::new(-1e6, 1e6, 0.0)) - 1.0).abs() < 1e-6);
 }
@@ -66,23 +49,11 @@ fn density_is_one_inside_and_nothing_outside() {
 #[test]
 fn droplets_splash_and_surfaces_edges_and_sheets_do_not() {
     let count = |cloud: &[Vec3]| run(cloud, 1.0).1;
-    for droplets in [
-        vec![Vec3::ZERO],
-        vec![Vec3::ZERO, Vec3::X * 2.0],
-        block([0; 3], [0, 0, 2]),
-    ] {
+    for droplets in [vec![Vec3::ZERO], vec![Vec3::ZERO, Vec3::X * 2.0], block([0; 3], [0, 0, 2])] {
         assert_eq!(count(&droplets).body, 0, "{droplets:?}");
     }
-    assert_eq!(
-        count(&block([0; 3], [7; 3])).splash,
-        0,
-        "a cube with its faces, edges, corners"
-    );
-    assert_eq!(
-        count(&block([0; 3], [9, 9, 1])).splash,
-        0,
-        "a sheet two particles thin"
-    );
+    assert_eq!(count(&block([0; 3], [7; 3])).splash, 0, "a cube with its faces, edges, corners");
+    assert_eq!(count(&block([0; 3], [9, 9, 1])).splash, 0, "a sheet two particles thin");
     let sheet = block([0; 3], [9, 9, 0]);
     assert_eq!(count(&sheet).splash, 0, "a sheet one particle thin");
 }
@@ -91,33 +62,19 @@ fn droplets_splash_and_surfaces_edges_and_sheets_do_not() {
 fn two_thresholds_keep_the_last_class_between_them() {
     // A row: its inner particles have ρ/ρ0 = 0.478, its two ends 0.398.
     let row = block([0; 3], [5, 0, 0]);
-    let options = Options {
-        splash_threshold: 0.45,
-        ..Options::default()
-    };
+    let options = Options { splash_threshold: 0.45, ..Options::default() };
     let (splash, body) = (vec![Class::Splash; 6], vec![Class::Body; 6]);
     let mut fresh = body.clone();
     (fresh[0], fresh[5]) = (Class::Splash, Class::Splash);
     let now = |last| classify(&row, 1.0, &options, last).unwrap();
     assert_eq!(now(None), fresh);
-    assert_eq!(
-        now(Some((&splash, 0.5))),
-        splash,
-        "below the upper threshold nothing rejoins"
-    );
+    assert_eq!(now(Some((&splash, 0.5))), splash, "below the upper threshold nothing rejoins");
     assert_eq!(now(Some((&body, 0.5))), fresh);
     assert_eq!(now(Some((&splash, 0.46))), fresh, "above it, it does");
     let (_, report) = run(&row, 1.0);
     assert_eq!(report.splash, 6, "the default threshold");
     let error = classify(&row, 1.0, &options, Some((&body[1..], 0.5)));
-    assert!(matches!(
-        error,
-        Err(PrepareError::Length {
-            found: 5,
-            particles: 6,
-            ..
-        })
-    ));
+    assert!(matches!(error, Err(PrepareError::Length { found: 5, particles: 6, .. })));
 }
 
 #[test]
@@ -129,33 +86,18 @@ fn the_radius_is_half_the_spacing_less_a_known_bias() {
     assert_eq!(estimate_radius(&[Vec3::ONE; 5]), None);
     assert_eq!(estimate_radius(&[Vec3::ZERO, -Vec3::ZERO, Vec3::NAN]), None);
     let twice = [&cube[..], &cube[..]].concat();
-    assert_eq!(
-        estimate_radius(&twice),
-        estimate_radius(&cube),
-        "duplicates count once"
-    );
-    for half in [
-        Vec3::splat(9.0),
-        Vec3::new(9.0, 0.0, 9.0),
-        Vec3::Y,
-        Vec3::splat(1e-6),
-    ] {
+    assert_eq!(estimate_radius(&twice), estimate_radius(&cube), "duplicates count once");
+    for half in [Vec3::splat(9.0), Vec3::new(9.0, 0.0, 9.0), Vec3::Y, Vec3::splat(1e-6)] {
         let mut cloud = random.cloud(400, Vec3::ZERO, half);
         cloud.push(Vec3::splat(1e9));
         let nearest = |p: &Vec3| {
-            let others = cloud
-                .iter()
-                .filter(|q| *q != p)
-                .map(|q| p.as_dvec3().distance(q.as_dvec3()));
+            let others = cloud.iter().filter(|q| *q != p).map(|q| p.as_dvec3().distance(q.as_dvec3()));
             others.fold(f64::INFINITY, f64::min)
         };
         let mut brute: Vec<f64> = cloud.iter().map(nearest).collect();
         brute.sort_by(f64::total_cmp);
         let expected = (brute[brute.len() / 2] / 2.0 / 0.9) as f32;
         let found = estimate_radius(&random.shuffled(&cloud)).unwrap();
-        assert!(
-            (found / expected - 1.0).abs() < 1e-6,
-            "{found} for {expected}"
-        );
+        assert!((found / expected - 1.0).abs() < 1e-6, "{found} for {expected}");
     }
 }

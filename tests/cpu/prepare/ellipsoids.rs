@@ -20,18 +20,8 @@ fn eigen_solver_reconstructs() {
         let frame = DMat3::from_quat(turn.normalize());
         frame * DMat3::from_diagonal(scale) * frame.transpose()
     };
-    let mut matrices = vec![
-        DMat3::ZERO,
-        DMat3::IDENTITY,
-        DMat3::from_diagonal(DVec3::new(1.0, 3.0, 2.0)),
-    ];
-    for scale in [
-        [1.0, 2.0, 3.0],
-        [5.0, 5.0, 1.0],
-        [1.0, 0.0, 0.0],
-        [-2.0, 1e-9, 1e9],
-        [1e-40, 2e-40, 0.0],
-    ] {
+    let mut matrices = vec![DMat3::ZERO, DMat3::IDENTITY, DMat3::from_diagonal(DVec3::new(1.0, 3.0, 2.0))];
+    for scale in [[1.0, 2.0, 3.0], [5.0, 5.0, 1.0], [1.0, 0.0, 0.0], [-2.0, 1e-9, 1e9], [1e-40, 2e-40, 0.0]] {
         matrices.extend((0..200).map(|_| symmetric(scale.into())));
     }
     for m in matrices {
@@ -45,27 +35,16 @@ fn eigen_solver_reconstructs() {
         assert!((frame.transpose() * frame).abs_diff_eq(DMat3::IDENTITY, 1e-14));
         assert!((frame.determinant() - 1.0).abs() < 1e-14, "right-handed");
         for axis in [frame.x_axis, frame.y_axis] {
-            assert!(
-                axis.max_element() >= -axis.min_element(),
-                "the larger end is positive"
-            );
+            assert!(axis.max_element() >= -axis.min_element(), "the larger end is positive");
         }
     }
 }
 
 /// With no splash, no smoothing: the body ellipsoid of the particle at `at` keeps its centre.
 fn body_at(positions: &[Vec3], at: Vec3) -> Ellipsoid {
-    let options = Options {
-        splash_threshold: 0.0,
-        smoothing: 0.0,
-        ..Options::default()
-    };
+    let options = Options { splash_threshold: 0.0, smoothing: 0.0, ..Options::default() };
     let (particles, _) = prepare(&input(positions, 1.0), &options).unwrap();
-    *particles
-        .ellipsoids
-        .iter()
-        .find(|e| e.center == at)
-        .unwrap()
+    *particles.ellipsoids.iter().find(|e| e.center == at).unwrap()
 }
 
 #[test]
@@ -85,18 +64,10 @@ fn inside_a_lattice_the_ellipsoid_is_the_sphere() {
 fn on_a_flat_surface_the_ellipsoid_is_flattened_along_the_normal() {
     let slab = block([-6, -9, -6], [6, 0, 6]);
     let Ellipsoid { axes, .. } = body_at(&slab, Vec3::ZERO);
-    let lengths = axes
-        .to_cols_array_2d()
-        .map(|axis| Vec3::from(axis).length());
+    let lengths = axes.to_cols_array_2d().map(|axis| Vec3::from(axis).length());
     let normal = axes.z_axis.normalize();
-    assert!(
-        normal.y.abs() > 0.9999,
-        "the shortest axis is the normal: {normal}"
-    );
-    assert!(
-        (lengths[0] - lengths[1]).abs() < 1e-3 && lengths[0] > 0.95,
-        "{lengths:?}"
-    );
+    assert!(normal.y.abs() > 0.9999, "the shortest axis is the normal: {normal}");
+    assert!((lengths[0] - lengths[1]).abs() < 1e-3 && lengths[0] > 0.95, "{lengths:?}");
     assert!((0.25..0.5).contains(&lengths[2]), "{lengths:?}");
     // The smoothed centre moves straight down, by about a spacing.
     let (particles, _) = run(&slab, 1.0);
@@ -116,11 +87,7 @@ fn smoothing_moves_to_the_weighted_mean() {
         let ring = Vec3::new(angle.cos(), angle.sin(), 0.0) + Vec3::Z * 1.5;
         cloud.push(ring * if k % 2 == 0 { 1.0 } else { 2.0 });
     }
-    let options = Options {
-        splash_threshold: 0.0,
-        smoothing: 0.5,
-        ..Options::default()
-    };
+    let options = Options { splash_threshold: 0.0, smoothing: 0.5, ..Options::default() };
     let (particles, _) = prepare(&input(&cloud, 1.0), &options).unwrap();
     let weight = |p: &DVec3| 1.0 - (p.length() / 8.0).powi(3);
     let points = cloud.iter().map(|p| p.as_dvec3());
@@ -128,11 +95,7 @@ fn smoothing_moves_to_the_weighted_mean() {
     let mean: DVec3 = points.map(|p| p * weight(&p)).sum::<DVec3>() / sum;
     let expected = (0.5 * mean).as_vec3();
     let hit = |e: &&Ellipsoid| e.center.abs_diff_eq(expected, 1e-6);
-    assert_eq!(
-        particles.ellipsoids.iter().filter(hit).count(),
-        1,
-        "one at {expected}"
-    );
+    assert_eq!(particles.ellipsoids.iter().filter(hit).count(), 1, "one at {expected}");
 }
 
 #[test]
@@ -140,15 +103,9 @@ fn awkward_clouds_give_no_nan_hole_or_needle() {
     let mut random = Random(3);
     let mut clouds: Vec<(String, Vec<Vec3>)> = Vec::new();
     for n in 0..4 {
-        clouds.push((
-            format!("{n} alone"),
-            (0..n).map(|i| Vec3::X * 1.5 * i as f32).collect(),
-        ));
+        clouds.push((format!("{n} alone"), (0..n).map(|i| Vec3::X * 1.5 * i as f32).collect()));
     }
-    for (name, half) in [
-        ("collinear", Vec3::X),
-        ("coplanar", Vec3::new(1.0, 1.0, 0.0)),
-    ] {
+    for (name, half) in [("collinear", Vec3::X), ("coplanar", Vec3::new(1.0, 1.0, 0.0))] {
         clouds.push((name.into(), random.cloud(200, Vec3::ZERO, half * 12.0)));
         let dense = random.cloud(200, Vec3::splat(1e6), half * 1e-3);
         clouds.push((format!("{name}, dense"), dense));
@@ -162,29 +119,18 @@ fn awkward_clouds_give_no_nan_hole_or_needle() {
         for threshold in [0.0, 0.48, f32::INFINITY] {
             for (name, cloud) in &clouds {
                 let cloud: Vec<_> = cloud.iter().map(|p| p * radius).collect();
-                let options = Options {
-                    splash_threshold: threshold,
-                    ..Options::default()
-                };
+                let options = Options { splash_threshold: threshold, ..Options::default() };
                 let (particles, report) = prepare(&input(&cloud, radius), &options).unwrap();
                 assert_eq!(particles.ellipsoids.len(), cloud.len(), "{name}: no hole");
                 assert_eq!(report.splash + report.body, cloud.len());
                 assert_eq!(particles.splash_count, report.splash);
                 for (k, e) in particles.ellipsoids.iter().enumerate() {
                     assert!(e.center.is_finite() && e.axes.is_finite(), "{name}: {e:?}");
-                    let lengths = e
-                        .axes
-                        .to_cols_array_2d()
-                        .map(|a| Vec3::from(a).length() / radius);
+                    let lengths = e.axes.to_cols_array_2d().map(|a| Vec3::from(a).length() / radius);
                     let (long, short) = (lengths[0].max(lengths[1]), lengths[2]);
-                    assert!(
-                        long < 1.2001 && short > 0.0124 && long < 4.001 * short,
-                        "{name}: {e:?}"
-                    );
+                    assert!(long < 1.2001 && short > 0.0124 && long < 4.001 * short, "{name}: {e:?}");
                     assert!(e.axes.determinant() / radius.powi(3) > 0.0 || radius != 1.0);
-                    assert!(
-                        k >= report.splash || e.axes == Mat3::from_diagonal(Vec3::splat(radius))
-                    );
+                    assert!(k >= report.splash || e.axes == Mat3::from_diagonal(Vec3::splat(radius)));
                 }
             }
         }
@@ -193,27 +139,14 @@ fn awkward_clouds_give_no_nan_hole_or_needle() {
 
 #[test]
 fn guards_are_counted() {
-    let body = Options {
-        splash_threshold: 0.0,
-        ..Options::default()
-    };
+    let body = Options { splash_threshold: 0.0, ..Options::default() };
     let count = |cloud: &[Vec3]| prepare(&input(cloud, 1.0), &body).unwrap().1;
     // 26 particles have 25 neighbours each: one too few.
     assert_eq!(count(&vec![Vec3::ONE; 26]).few_neighbours, 26);
-    assert_eq!(
-        count(&vec![Vec3::ONE; 27]),
-        Report {
-            body: 27,
-            degenerate: 27,
-            ..Report::default()
-        }
-    );
+    assert_eq!(count(&vec![Vec3::ONE; 27]), Report { body: 27, degenerate: 27, ..Report::default() });
     // A long row: the middle is cut, the ends see half of it and are not; all are thickened.
     let line: Vec<_> = (0..200).map(|i| Vec3::X * 0.2 * i as f32).collect();
     let report = count(&line);
-    assert!(
-        report.clamped_ratio == 200 && report.degenerate == 0,
-        "{report:?}"
-    );
+    assert!(report.clamped_ratio == 200 && report.degenerate == 0, "{report:?}");
     assert!((100..200).contains(&report.clamped_long), "{report:?}");
 }

@@ -1,24 +1,28 @@
 //! One renderer on one device: frames in, targets out.
 
-use ash::vk;
-use meniscus::{
+use super::{Canvas, Gpu, HostError};
+use crate::{
     Equirect, FrameInput, Renderer,
-    host::{Canvas, Gpu, HostError},
     profile::FrameTimes,
     targets::{Id, Spec},
 };
+use ash::vk;
 
 /// Output format: linear float, so that one frame serves pictures, dumps and downsampling.
 const FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
+/// A renderer, an environment and an output of one size on one device; every call waits.
 pub struct Session<'a> {
+    /// The device.
     pub gpu: &'a Gpu<'a>,
+    /// The renderer, for particles, needs and memory.
     pub renderer: Renderer,
     canvas: Canvas<'a>,
     size: [u32; 2],
 }
 
 impl<'a> Session<'a> {
+    /// Makes the renderer and uploads the environment.
     pub fn new(gpu: &'a Gpu<'a>, size: [u32; 2], environment: &Equirect) -> Result<Session<'a>, HostError> {
         // SAFETY: `gpu` outlives the session, was made with the required features, and says whether it has large points.
         let mut renderer = unsafe { Renderer::new(gpu.host(1), FORMAT) }?;
@@ -37,7 +41,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Renders one frame and waits for it.
+    /// Renders one frame into the session's own output (`input.output` is ignored) and waits for it.
     pub fn frame(&mut self, input: &FrameInput) -> Result<Option<FrameTimes>, HostError> {
         let input = FrameInput { output: self.canvas.view, ..*input };
         let (renderer, canvas) = (&mut self.renderer, &self.canvas);
@@ -72,6 +76,7 @@ impl<'a> Session<'a> {
         Ok(Some(data.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect()))
     }
 
+    /// Destroys the renderer.
     pub fn end(self) {
         let Session { renderer, .. } = self;
         // SAFETY: every `run` has waited.

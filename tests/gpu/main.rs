@@ -1,0 +1,4 @@
+//! Passes on every Vulkan driver there is, against their CPU twins, with core and synchronization validation on.
+
+mod smoke;
+mod support;

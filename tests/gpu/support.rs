@@ -1,0 +1,172 @@
+//! What every GPU test shares: each driver with validation on, a frame of chosen particles, its targets read back.
+
+use glam::{Mat3, Vec3};
+use meniscus::{
+    Camera, Ellipsoid, Equirect, FrameInput, Particles, Settings,
+    host::{Gpu, Instance, Session},
+    shader::Frame,
+    targets::Id,
+};
+use std::collections::HashMap;
+
+/// One frame's input.
+#[derive(Clone)]
+pub struct Case {
+    pub particles: Particles,
+    pub camera: Camera,
+    pub settings: Settings,
+    pub size: [u32; 2],
+    pub eye_inside: bool,
+}
+
+/// What a frame left behind.
+pub struct Shot {
+    pub frame: Frame,
+    pub size: [u32; 2],
+    pub picture: Vec<[f32; 3]>,
+    targets: HashMap<(Id, u32), Vec<u32>>,
+}
+
+impl Shot {
+    /// Raw words of one layer of a target or of a buffer; `None` if the frame did without it.
+    pub fn words(&self, id: Id, layer: u32) -> Option<&[u32]> {
+        self.targets.get(&(id, layer)).map(Vec::as_slice)
+    }
+
+    /// The same as floats.
+    pub fn floats(&self, id: Id, layer: u32) -> Option<Vec<f32>> {
+        self.words(id, layer).map(|w| w.iter().map(|w| f32::from_bits(*w)).collect())
+    }
+
+    pub fn counter(&self, slot: u32) -> u32 {
+        self.words(Id::Counters, 0).expect("there were particles")[slot as usize]
+    }
+}
+
+/// One driver: an instance of its own, so that its validation messages are its own too.
+pub struct Driver {
+    instance: Instance,
+    pub name: String,
+}
+
+impl Driver {
+    pub fn is_swiftshader(&self) -> bool {
+        self.name.contains("SwiftShader")
+    }
+
+    /// Renders a case (with `debug` targets) and reads everything back.
+    pub fn shoot(&self, case: &Case) -> Shot {
+        let device = self.instance.pick(Some(&self.name)).expect("it was there a moment ago");
+        let gpu = Gpu::new(&self.instance, device).expect("device");
+        let mut session = Session::new(&gpu, case.size, &Equirect::procedural_sky()).expect("session");
+        session.renderer.set_particles(&case.particles).expect("particles");
+        let input = FrameInput {
+            slot: 0,
+            camera: &case.camera,
+            settings: &case.settings,
+            scene: None,
+            eye_inside: case.eye_inside,
+            output: ash::vk::ImageView::null(),
+            debug: true,
+        };
+        session.frame(&input).expect("frame");
+        let mut targets = HashMap::new();
+        for id in Id::OWN.into_iter().filter(|id| *id != Id::SplatDepth) {
+            for layer in 0..2 {
+                if let Some(words) = session.words(id, layer).expect("read back") {
+                    targets.insert((id, layer), words);
+                }
+            }
+        }
+        let picture = session.picture().expect("picture");
+        session.end();
+        let bounds = case.particles.bounds().unwrap_or_default();
+        let mut frame = case.camera.uniforms(&case.settings, case.size, case.particles.radius, bounds);
+        frame.scene.w = f32::from(case.eye_inside);
+        Shot { frame, size: case.size, picture, targets }
+    }
+}
+
+/// Runs a test on every usable driver, with core and synchronization validation; any message fails it, and so does
+/// finding no driver at all, or not those that MENISCUS_DRIVERS (comma-separated parts of names) calls for.
+pub fn each_driver(test: impl Fn(&Driver)) {
+    let devices = Instance::new(false).and_then(|i| i.devices()).expect("a Vulkan loader");
+    let usable: Vec<_> = devices.into_iter().filter(|d| d.refusal.is_none()).collect();
+    assert!(!usable.is_empty(), "no usable Vulkan device: run ./setup.sh");
+    if let Ok(wanted) = std::env::var("MENISCUS_DRIVERS") {
+        for w in wanted.split(',').filter(|w| !w.is_empty()) {
+            let found = usable.iter().any(|d| d.name.to_lowercase().contains(&w.to_lowercase()));
+            assert!(found, "MENISCUS_DRIVERS calls for \"{w}\", which is not here");
+        }
+    }
+    for device in usable {
+        let instance = Instance::new(true).expect("validation layer: run ./setup.sh");
+        let driver = Driver { instance, name: device.name };
+        println!("driver: {} ({})", driver.name, device.driver);
+        test(&driver);
+        let messages = driver.instance.messages();
+        assert!(messages.is_empty(), "{}: validation:\n{}", driver.name, messages.join("\n"));
+    }
+}
+
+/// A small linear congruential generator: the same numbers everywhere, no dependency.
+pub struct Random(pub u64);
+
+impl Random {
+    /// Uniform in 0..1.
+    pub fn unit(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    pub fn between(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.unit()
+    }
+
+    pub fn point(&mut self, low: Vec3, high: Vec3) -> Vec3 {
+        low + (high - low) * Vec3::new(self.unit(), self.unit(), self.unit())
+    }
+
+    pub fn rotation(&mut self) -> Mat3 {
+        let axis = (self.point(Vec3::splat(-1.0), Vec3::ONE) + Vec3::new(0.0, 0.0, 1e-3)).normalize();
+        Mat3::from_axis_angle(axis, self.between(0.0, std::f32::consts::TAU))
+    }
+}
+
+/// A sphere as drawn.
+pub fn sphere(center: Vec3, radius: f32) -> Ellipsoid {
+    Ellipsoid { center, axes: Mat3::from_diagonal(Vec3::splat(radius)) }
+}
+
+/// Random particles of radius `radius` in a box: `splash` spheres, then `body` ellipsoids with semi-axes of 0.3 to
+/// 1.2 radii in any orientation.
+pub fn random_cloud(seed: u64, radius: f32, low: Vec3, high: Vec3, splash: usize, body: usize) -> Particles {
+    let mut random = Random(seed);
+    let mut ellipsoids: Vec<_> = (0..splash).map(|_| sphere(random.point(low, high), radius)).collect();
+    for _ in 0..body {
+        let axes = radius * Vec3::new(random.between(0.3, 1.2), random.between(0.3, 1.2), random.between(0.3, 1.2));
+        ellipsoids
+            .push(Ellipsoid { center: random.point(low, high), axes: random.rotation() * Mat3::from_diagonal(axes) });
+    }
+    Particles { radius, ellipsoids, splash_count: splash }
+}
+
+/// A filled box of body spheres at rest spacing (2 r), `n` particles along each axis, centred at `center`.
+pub fn lattice(center: Vec3, radius: f32, n: [usize; 3]) -> Vec<Ellipsoid> {
+    let mut all = Vec::new();
+    for i in 0..n[0] {
+        for j in 0..n[1] {
+            for k in 0..n[2] {
+                let at = Vec3::new(i as f32, j as f32, k as f32)
+                    - 0.5 * (Vec3::new(n[0] as f32, n[1] as f32, n[2] as f32) - 1.0);
+                all.push(sphere(center + 2.0 * radius * at, radius));
+            }
+        }
+    }
+    all
+}
+
+/// A camera at `eye` looking at `target`, 45 degrees high, near plane at 0.01.
+pub fn camera(eye: Vec3, target: Vec3, size: [u32; 2]) -> Camera {
+    Camera::look_at(eye, target, Vec3::Y, 45f32.to_radians(), size[0] as f32 / size[1] as f32, 0.01)
+}
