@@ -44,7 +44,7 @@ impl Equirect {
     /// The sky used when there is no map: a clear afternoon over a tiled floor that fades into haze, so that
     /// refraction has straight lines to bend. Made here, needs no file.
     pub fn procedural_sky() -> Equirect {
-        let (width, height) = (1024u32, 512u32);
+        let (width, height) = (2048u32, 1024u32);
         let mut rgb = Vec::with_capacity((width * height) as usize);
         for y in 0..height {
             for x in 0..width {
@@ -60,7 +60,7 @@ impl Equirect {
 
 /// Light from one direction of the procedural sky.
 fn sky(dir: Vec3) -> Vec3 {
-    let (zenith, horizon) = (Vec3::new(0.16, 0.34, 0.72), Vec3::new(0.78, 0.86, 0.92));
+    let (zenith, horizon) = (Vec3::new(0.07, 0.2, 0.52), Vec3::new(0.72, 0.8, 0.86));
     let smooth = |a: f32, b: f32, x: f32| {
         let t = ((x - a) / (b - a)).clamp(0.0, 1.0);
         t * t * (3.0 - 2.0 * t)
@@ -76,14 +76,16 @@ fn sky(dir: Vec3) -> Vec3 {
         let glow = Vec3::new(1.0, 0.9, 0.7) * (0.5 * toward.powi(24) + 40.0 * smooth(0.9985, 0.9995, toward));
         return air.lerp(Vec3::splat(1.05), cloud) + glow;
     }
-    // A floor one unit below: tiles with joints, two shades, fading into the haze of the horizon.
+    // A floor one unit below: dark tiles with light joints, two shades, fading into the haze of the horizon.
     let p = glam::Vec2::new(dir.x, dir.z) / -dir.y;
-    let tile = p * 1.5;
-    let near = (-0.16 * p.length()).exp();
+    let tile = p * 2.0;
+    let far = p.length();
     let edge = (tile - tile.round()).abs().min_element();
-    let joint = 1.0 - smooth(0.015, 0.04 + 0.01 * p.length(), edge);
-    let odd = (tile.x.floor() + tile.y.floor()).rem_euclid(2.0);
-    let stone = Vec3::new(0.62, 0.56, 0.48) * (0.72 + 0.28 * odd);
-    let ground = stone.lerp(Vec3::new(0.2, 0.19, 0.18), 0.8 * joint);
-    (0.85 * horizon).lerp(ground, near)
+    // A texel sees ever more floor with distance: joints widen with it, and pale as they do, so that they do not alias.
+    let width = 0.04f32.max(0.014 * (1.0 + far * far));
+    let joint = (1.0 - smooth(0.3 * width, width, edge)) * (0.04 / width).min(1.0);
+    let odd = (tile.x.floor() + tile.y.floor()).rem_euclid(2.0) - 0.5;
+    let stone = Vec3::new(0.135, 0.15, 0.17) * (1.0 + 0.7 * odd * (-0.35 * far).exp());
+    let ground = stone.lerp(Vec3::new(0.55, 0.52, 0.46), 0.75 * joint);
+    (0.8 * horizon).lerp(ground, (-0.05 * far).exp())
 }

@@ -180,7 +180,7 @@ fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn Error>>
     let (low, high) = scene.particles.bounds().unwrap_or((Vec3::splat(-1.0), Vec3::splat(1.0)));
     let aspect = args.size[0].max(1) as f32 / args.size[1].max(1) as f32;
     let view = View { eye: args.eye, target: args.target, up: args.up, fov_y_deg: args.fov_y };
-    let (camera, eye) = camera::frame(&view, scene.origin, low, high, aspect, 0.1 * radius)?;
+    let (camera, eye) = camera::frame(&view, scene.origin, &scene.particles, aspect, 0.1 * radius)?;
     let s = args.supersample;
     let times = |edge: u32| edge.checked_mul(s).ok_or("the size times the supersampling is too large");
     let settings = Settings {
