@@ -33,7 +33,10 @@ pub fn to_rust(glsl: &str) -> Result<String, String> {
                     "uvec4" => "glam::UVec4",
                     other => return Err(format!("{number}: error: {other} would not be laid out alike in Rust")),
                 };
-                writeln!(rust, "    /// {}\n    pub {name}: {kind},", comment.trim()).unwrap();
+                if !comment.is_empty() {
+                    writeln!(rust, "    /// {}", comment.trim()).unwrap();
+                }
+                writeln!(rust, "    pub {name}: {kind},").unwrap();
             }
             _ => return Err(format!("{number}: error: build.rs does not understand this line")),
         }

@@ -9,7 +9,7 @@
 //! * [`Renderer`] borrows the host's instance, device and allocator ([`Host`]); it creates no device, submits
 //!   nothing, waits for nothing and presents nothing. It needs Vulkan 1.3 with `dynamicRendering` and
 //!   `synchronization2` enabled, and one queue family with graphics and compute; see [`device`].
-//! * [`Renderer::record`] records one frame, [`frame::record`] is that frame from top to bottom.
+//! * [`Renderer::record`] records one frame, `src/frame.rs` is that frame from top to bottom.
 //! * Frames are submitted to one queue in the order they were recorded. Before the host records into a slot again
 //!   (`slot < frames_in_flight`), the frame last recorded into it has completed. Replaced resources are kept until
 //!   then, and destroyed without waiting.

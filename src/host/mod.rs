@@ -123,7 +123,13 @@ impl Instance {
             info = info.push_next(&mut features).push_next(m);
         }
         // SAFETY: the info and all it points to outlive the call; the messages are boxed and outlive the instance.
-        let handle = unsafe { entry.create_instance(&info, None) }.map_err(vulkan("instance"))?;
+        let handle = unsafe { entry.create_instance(&info, None) }.map_err(|e| match e {
+            // The loader's word for "no driver at all".
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER => {
+                HostError::NoDevice { wanted: String::new(), found: "there is no driver".to_owned() }
+            }
+            e => HostError::Vulkan("instance", e),
+        })?;
         let mut instance =
             Instance { debug: None, messenger: vk::DebugUtilsMessengerEXT::null(), messages, handle, _entry: entry };
         if debug {
@@ -466,6 +472,14 @@ impl<'a> Canvas<'a> {
         unsafe {
             self.gpu.device.cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default().image_memory_barriers(&barrier))
         };
+    }
+
+    /// Records a clear of the whole image, which is in `layout`.
+    pub fn clear(&self, cmd: vk::CommandBuffer, layout: vk::ImageLayout, value: [f32; 4]) {
+        let range = [crate::access::whole(vk::ImageAspectFlags::COLOR)];
+        let value = vk::ClearColorValue { float32: value };
+        // SAFETY: `cmd` is recording outside rendering; the image is alive, in this layout, with TRANSFER_DST.
+        unsafe { self.gpu.device.cmd_clear_color_image(cmd, self.image, layout, &value, &range) };
     }
 
     /// The pixels, row by row, after a frame that left them in `COLOR_ATTACHMENT_OPTIMAL`.

@@ -56,6 +56,7 @@ pub struct Report {
 
 /// Why particles could not be prepared. Indices are those of the input.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // the fields are what the messages below say they are
 pub enum PrepareError {
     /// A radius that is not finite and positive.
     #[error("particle radius {0} is not a positive number: give half the rest spacing, in world units")]

@@ -50,6 +50,10 @@ pub struct Driver {
 }
 
 impl Driver {
+    pub fn instance(&self) -> &Instance {
+        &self.instance
+    }
+
     pub fn is_swiftshader(&self) -> bool {
         self.name.contains("SwiftShader")
     }

@@ -13,7 +13,13 @@ pub struct View {
 
 /// The camera, and its eye, in coordinates relative to `origin`. What is not given is chosen so that the
 /// liquid fills the view.
-pub fn frame(view: &View, origin: DVec3, particles: &Particles, aspect: f32, near: f32) -> Result<(Camera, Vec3), Error> {
+pub fn frame(
+    view: &View,
+    origin: DVec3,
+    particles: &Particles,
+    aspect: f32,
+    near: f32,
+) -> Result<(Camera, Vec3), Error> {
     if !(view.fov_y_deg > 0.0 && view.fov_y_deg < 170.0) {
         return Err(wrong("fov-y", view.fov_y_deg.to_string(), "use degrees above 0 and below 170"));
     }

@@ -1,0 +1,94 @@
+//! The house's own rules: a pass has its four files, no file grows past what can be read, licences are permissive.
+
+use std::{fs, path::Path};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Passes without a shader of their own, and why.
+const NO_SHADER: &[&str] = &["reset"]; // fills and updates buffers: its effect is read back in every other pass's test
+
+#[test]
+fn a_pass_has_one_home() {
+    let mut found = 0;
+    for entry in fs::read_dir(root().join("src/passes")).expect("src/passes") {
+        let path = entry.expect("readable").path();
+        let stem = path.file_stem().expect("a file").to_string_lossy().into_owned();
+        if stem == "mod" || NO_SHADER.contains(&stem.as_str()) {
+            continue;
+        }
+        found += 1;
+        let shader = ["comp", "frag"].iter().any(|e| root().join(format!("glsl/{stem}.{e}")).exists());
+        assert!(shader, "pass {stem} has no shader glsl/{stem}.*");
+        for other in [format!("src/twin/{stem}.rs"), format!("tests/gpu/{stem}.rs")] {
+            assert!(root().join(&other).exists(), "pass {stem} has no {other}");
+        }
+    }
+    assert!(found >= 6, "only {found} passes");
+}
+
+#[test]
+fn no_file_is_too_long() {
+    fn walk(folder: &Path, check: &mut dyn FnMut(&Path)) {
+        for entry in fs::read_dir(folder).expect("readable folder") {
+            let path = entry.expect("readable").path();
+            if path.is_dir() { walk(&path, check) } else { check(&path) }
+        }
+    }
+    for folder in ["src", "glsl", "tests", "build"] {
+        walk(&root().join(folder), &mut |path| {
+            let lines = fs::read_to_string(path).map_or(0, |s| s.lines().count());
+            assert!(lines <= 500, "{} has {lines} lines", path.display());
+        });
+    }
+}
+
+/// Every crate in the lock file can be had under one of these.
+const PERMISSIVE: &[&str] = &[
+    "MIT",
+    "Apache-2.0",
+    "Apache-2.0 WITH LLVM-exception",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "ISC",
+    "Zlib",
+    "Unlicense",
+    "Unicode-3.0",
+    "0BSD",
+    "CC0-1.0",
+    "BSL-1.0",
+];
+
+/// An SPDX expression: `OR` (and the old `/`) offer, `AND` demands.
+fn permissive(expression: &str) -> bool {
+    let plain = expression.replace(['(', ')'], "");
+    plain
+        .split(" AND ")
+        .all(|part| part.split(" OR ").flat_map(|p| p.split('/')).any(|l| PERMISSIVE.contains(&l.trim())))
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn dependencies_are_permissively_licensed() {
+    assert!(
+        permissive("MIT OR GPL-3.0")
+            && permissive("(MIT OR Apache-2.0) AND Unicode-3.0")
+            && permissive("MIT/Apache-2.0")
+    );
+    assert!(!permissive("GPL-3.0") && !permissive("MIT AND LGPL-2.1"));
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+    let output = std::process::Command::new(cargo)
+        .args(["metadata", "--format-version", "1", "--locked", "--all-features"])
+        .current_dir(root())
+        .output()
+        .expect("cargo metadata");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let packages = metadata["packages"].as_array().expect("packages");
+    assert!(packages.len() > 50, "only {} packages", packages.len());
+    for p in packages {
+        let licence = p["license"].as_str().unwrap_or("none stated");
+        assert!(permissive(licence), "{} {}: licence {licence}", p["name"], p["version"]);
+    }
+}

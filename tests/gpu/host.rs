@@ -1,0 +1,240 @@
+//! The contract with the host: frames in flight, replaced resources, host scenes, output formats.
+
+use crate::support::{Case, Driver, camera, each_driver, random_cloud, sphere};
+use ash::vk;
+use glam::Vec3;
+use meniscus::{
+    Equirect, FrameInput, Particles, Renderer, SceneInput, Settings,
+    host::{Canvas, Gpu},
+    targets::Needs,
+    twin::optics::srgb_byte,
+};
+
+const SIZE: [u32; 2] = [96, 72];
+
+fn case(particles: Particles) -> Case {
+    let eye = Vec3::new(0.0, 0.0, 3.0);
+    Case {
+        particles,
+        camera: camera(eye, Vec3::ZERO, SIZE),
+        settings: Settings::default(),
+        size: SIZE,
+        eye_inside: false,
+    }
+}
+
+fn ball() -> Particles {
+    Particles { radius: 0.5, ellipsoids: vec![sphere(Vec3::ZERO, 0.5)], splash_count: 1 }
+}
+
+/// A renderer on a device of its own, given to `body`, then destroyed.
+fn with_renderer(driver: &Driver, format: vk::Format, frames: u32, body: impl FnOnce(&Gpu, &mut Renderer)) {
+    let device = driver.instance().pick(Some(&driver.name)).expect("it was there a moment ago");
+    let gpu = Gpu::new(driver.instance(), device).expect("device");
+    // SAFETY: the device outlives the renderer and has the required features.
+    let mut renderer = unsafe { Renderer::new(gpu.host(frames), format) }.expect("renderer");
+    renderer.resize(SIZE).expect("size");
+    // SAFETY: recorded outside rendering, before any frame.
+    gpu.run(|cmd| Ok(unsafe { renderer.set_environment(cmd, &Equirect::procedural_sky()) }?)).expect("environment");
+    body(&gpu, &mut renderer);
+    // SAFETY: every command buffer was waited for.
+    unsafe { renderer.destroy() };
+}
+
+fn input<'a>(case: &'a Case, slot: usize, output: vk::ImageView) -> FrameInput<'a> {
+    FrameInput {
+        slot,
+        camera: &case.camera,
+        settings: &case.settings,
+        scene: None,
+        eye_inside: false,
+        output,
+        debug: false,
+    }
+}
+
+#[test]
+fn two_frames_in_flight_with_everything_replaced_between() {
+    each_driver(|driver| {
+        with_renderer(driver, vk::Format::R32G32B32A32_SFLOAT, 2, |gpu, renderer| {
+            let clouds: Vec<_> = (0..4)
+                .map(|i| case(random_cloud(i, 0.1, Vec3::splat(-0.6), Vec3::splat(0.6), 10 * i as usize, 60)))
+                .collect();
+            let canvases: Vec<_> =
+                (0..2).map(|_| Canvas::new(gpu, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE).expect("canvas")).collect();
+            // Both slots of a pair go out in one submission: the second is recorded while the first has not run yet,
+            // with other particles, and with settings that need other targets.
+            for pair in 0..2 {
+                gpu.run(|cmd| {
+                    for slot in 0..2 {
+                        let mut case = clouds[2 * pair + slot].clone();
+                        case.settings.refractions = [4, 1][slot];
+                        case.settings.iterations = 1 + slot as u32;
+                        renderer.set_particles(&case.particles)?;
+                        let canvas = &canvases[slot];
+                        canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+                        // SAFETY: `cmd` is recording outside rendering; the slot's last frame was waited for by `run`.
+                        unsafe { renderer.record(cmd, &input(&case, slot, canvas.view)) }?;
+                    }
+                    Ok(())
+                })
+                .expect("frames");
+                for (slot, canvas) in canvases.iter().enumerate() {
+                    let mut alone = clouds[2 * pair + slot].clone();
+                    alone.settings.refractions = [4, 1][slot];
+                    alone.settings.iterations = 1 + slot as u32;
+                    let expected: Vec<f32> = driver.shoot(&alone).picture.into_iter().flatten().collect();
+                    let words = canvas.read().expect("picture");
+                    let found: Vec<f32> = words
+                        .chunks_exact(16)
+                        .flat_map(|p| [0, 4, 8].map(|o| f32::from_ne_bytes([p[o], p[o + 1], p[o + 2], p[o + 3]])))
+                        .collect();
+                    // The debug variant that `shoot` draws with is another program, which may round otherwise.
+                    let differ =
+                        expected.iter().zip(&found).filter(|(a, b)| (*a - *b).abs() > 1e-3 * a.abs().max(0.1)).count();
+                    assert!(differ * 100 < found.len(), "{}: slot {slot}: {differ} values differ", driver.name);
+                }
+                assert!(renderer.times(0).is_some() && renderer.times(1).is_some(), "{}: no times", driver.name);
+            }
+        });
+    });
+}
+
+#[test]
+fn memory_is_known_before_it_is_allocated() {
+    each_driver(|driver| {
+        with_renderer(driver, vk::Format::R32G32B32A32_SFLOAT, 1, |gpu, renderer| {
+            let case = case(random_cloud(5, 0.1, Vec3::splat(-0.6), Vec3::splat(0.6), 5, 60));
+            let needs = Needs::new(SIZE, 5, 60, &case.settings, false);
+            let asked = renderer.memory_requirements(&needs);
+            renderer.set_particles(&case.particles).expect("particles");
+            let canvas = Canvas::new(gpu, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE).expect("canvas");
+            gpu.run(|cmd| {
+                canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+                // SAFETY: as above.
+                Ok(unsafe { renderer.record(cmd, &input(&case, 0, canvas.view)) }?)
+            })
+            .expect("frame");
+            let got = renderer.memory();
+            for entry in &asked {
+                assert!(got.contains(entry), "{}: asked {entry:?}, got {got:?}", driver.name);
+            }
+            // Beside them only what is extra by its documentation.
+            assert_eq!(got.len(), asked.len() + 2, "{}: {got:?}", driver.name);
+        });
+    });
+}
+
+#[test]
+fn unorm_outputs_are_encoded_as_srgb() {
+    each_driver(|driver| {
+        let case = case(ball());
+        let linear = driver.shoot(&case).picture;
+        with_renderer(driver, vk::Format::R8G8B8A8_UNORM, 1, |gpu, renderer| {
+            renderer.set_particles(&case.particles).expect("particles");
+            let canvas = Canvas::new(gpu, vk::Format::R8G8B8A8_UNORM, 4, SIZE).expect("canvas");
+            gpu.run(|cmd| {
+                canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+                // SAFETY: as above.
+                Ok(unsafe { renderer.record(cmd, &input(&case, 0, canvas.view)) }?)
+            })
+            .expect("frame");
+            let bytes = canvas.read().expect("picture");
+            let found = bytes.chunks_exact(4).flat_map(|p| &p[..3]);
+            let worse = found.zip(linear.iter().flatten()).filter(|(b, v)| b.abs_diff(srgb_byte(**v)) > 1).count();
+            // Pixels on the ball's rim may walk another way in the other program.
+            assert!(worse * 500 < linear.len() * 3, "{}: {worse} bytes differ by more than 1", driver.name);
+        });
+    });
+}
+
+#[test]
+fn a_host_scene_is_hidden_seen_and_seen_through_the_liquid() {
+    const RED: [f32; 4] = [0.9, 0.1, 0.2, 1.0];
+    each_driver(|driver| {
+        with_renderer(driver, vk::Format::R32G32B32A32_SFLOAT, 1, |gpu, renderer| {
+            let case = case(ball());
+            renderer.set_particles(&case.particles).expect("particles");
+            let canvas = |format, texel| Canvas::new(gpu, format, texel, SIZE).expect("canvas");
+            let output = canvas(vk::Format::R32G32B32A32_SFLOAT, 16);
+            let color = canvas(vk::Format::R32G32B32A32_SFLOAT, 16);
+            let depth = canvas(vk::Format::R32_SFLOAT, 4);
+            // A red wall at linear depth d: z = (P22 z_e + P23) / -z_e.
+            let p = case.camera.projection;
+            let render = |renderer: &mut Renderer, d: f32| {
+                let z = (p.w_axis.z - p.z_axis.z * d) / d;
+                gpu.run(|cmd| {
+                    let general = vk::ImageLayout::GENERAL;
+                    for (canvas, value) in [(&color, RED), (&depth, [z; 4])] {
+                        canvas.transition(cmd, vk::ImageLayout::UNDEFINED, general);
+                        canvas.clear(cmd, general, value);
+                        canvas.transition(cmd, general, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
+                    }
+                    output.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+                    let scene = SceneInput {
+                        color: color.view,
+                        color_layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+                        depth: depth.view,
+                        depth_layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+                        cleared_depth: 1.0,
+                    };
+                    let input = FrameInput { scene: Some(scene), ..input(&case, 0, output.view) };
+                    // SAFETY: as above; the scene was just brought into the stated layout.
+                    Ok(unsafe { renderer.record(cmd, &input) }?)
+                })
+                .expect("frame");
+                let bytes = output.read().expect("picture");
+                let float = |o: usize| f32::from_ne_bytes([bytes[o], bytes[o + 1], bytes[o + 2], bytes[o + 3]]);
+                (0..(SIZE[0] * SIZE[1]) as usize)
+                    .map(|i| [float(16 * i), float(16 * i + 4), float(16 * i + 8)])
+                    .collect::<Vec<_>>()
+            };
+            let red = |c: &[f32; 3]| (0..3).all(|k| (c[k] - RED[k]).abs() < 1e-6);
+            let middle = (SIZE[1] / 2 * SIZE[0] + SIZE[0] / 2) as usize;
+            // Before the ball: the wall is all there is.
+            assert!(render(renderer, 2.0).iter().all(red), "{}: the wall hides the ball", driver.name);
+            // Behind it: the wall around, and through the ball's middle, where a ray goes almost straight, less what
+            // two surfaces reflect (2 % each at normal incidence).
+            let picture = render(renderer, 4.0);
+            assert!(red(&picture[0]), "{}: the wall beside the ball {:?}", driver.name, picture[0]);
+            let c = picture[middle];
+            assert!(c[0] > 0.93 * RED[0] && c[0] < 1.05 * RED[0], "{}: through the ball {c:?}", driver.name);
+            // Nothing there (cleared depth): the environment, as without a scene.
+            let plain = driver.shoot(&case).picture;
+            let z1 = p.w_axis.z / (1.0 + p.z_axis.z);
+            if z1.is_finite() && z1 > 0.0 {
+                assert_eq!(render(renderer, z1)[0], plain[0], "{}: the environment behind nothing", driver.name);
+            }
+        });
+    });
+}
+
+#[test]
+fn what_the_caller_gets_wrong_is_said() {
+    each_driver(|driver| {
+        with_renderer(driver, vk::Format::R32G32B32A32_SFLOAT, 1, |gpu, renderer| {
+            let case = case(ball());
+            assert!(renderer.resize([0, 5]).is_err() && renderer.resize([1 << 20, 5]).is_err());
+            let bad = Particles { radius: f32::NAN, ..ball() };
+            assert!(renderer.set_particles(&bad).is_err());
+            let canvas = Canvas::new(gpu, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE).expect("canvas");
+            let mut refused = |input: &FrameInput| {
+                gpu.run(|cmd| {
+                    // SAFETY: refused before anything is recorded.
+                    Ok(unsafe { renderer.record(cmd, input) }.unwrap_err().to_string())
+                })
+                .expect("an empty command buffer")
+            };
+            assert!(refused(&input(&case, 7, canvas.view)).contains("slot is 7"));
+            let mut skewed = case.clone();
+            skewed.camera.view.x_axis *= 2.0;
+            assert!(refused(&input(&skewed, 0, canvas.view)).contains("camera view"));
+            let mut flat = case.clone();
+            flat.camera.near = 0.0;
+            assert!(refused(&input(&flat, 0, canvas.view)).contains("near plane"));
+            // SAFETY: a new renderer on the same device; refused or destroyed at once.
+            let other = unsafe { Renderer::new(gpu.host(1), vk::Format::BC1_RGB_UNORM_BLOCK) };
+            assert!(other.err().expect("no colour attachment").to_string().contains("BC1_RGB_UNORM_BLOCK"));
+        });
+    });
+}
