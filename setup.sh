@@ -40,4 +40,11 @@ if [ ! -f "$out/libshaderc_combined.a" ] || [ "$lib/libshaderc_combined.a" -nt "
   } | ar -M
   mv "$out/libshaderc_combined.a.new" "$out/libshaderc_combined.a"
 fi
+# Chromium also carries a validation layer years newer than Debian's; CI runs the GPU tests under both.
+layer=/usr/lib/chromium/libVkLayer_khronos_validation.so
+manifest=/usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json
+if [ -f "$layer" ] && [ -f "$manifest" ]; then
+  mkdir -p target/layers
+  sed "s#\"library_path\": *\"[^\"]*\"#\"library_path\": \"$layer\"#" "$manifest" > target/layers/VkLayer_khronos_validation.json
+fi
 echo "setup: done"
