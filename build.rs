@@ -17,6 +17,7 @@ const SHADERS: &[(&str, &str, &[&str])] = &[
     ("SPLAT_FRAG", "splat.frag", &[]),
     ("PLANE_FIT_COMP", "plane_fit.comp", &[]),
     ("NORMALS_COMP", "normals.comp", &[]),
+    ("TILES_COMP", "tiles.comp", &[]),
     ("REFRACT_VERT", "refract.vert", &[]),
     ("REFRACT_FRAG", "refract.frag", &[]),
     ("REFRACT_DEBUG_FRAG", "refract.frag", &["DEBUG"]),

@@ -22,6 +22,7 @@ layout(set = 0, binding = 4) uniform utexture2DArray splash_normal;
 layout(set = 0, binding = 5) uniform texture2D environment; // equirectangular, linear
 layout(set = 0, binding = 6) uniform texture2D scene_color; // the host's opaque scene, linear
 layout(set = 0, binding = 7) uniform texture2D scene_depth; // its depth buffer
+layout(set = 0, binding = 8) uniform texture2DArray front_tiles; // smallest, largest front depth
 layout(location = 0) out vec4 out_color;
 #ifdef DEBUG
 layout(location = 1) out vec4 out_walk;      // pattern, outcome, hits, length inside
@@ -99,6 +100,9 @@ void main() {
             light *= exp(-frame.absorption.rgb * t);
             if (outcome != OUTCOME_HIT) break;
             hits += 1.0;
+            bool smooth_here;
+            sample_depth(cls, side, project(x), smooth_here);
+            if (!smooth_here && doubt == OUTCOME_HIT) doubt = OUTCOME_PAST_JUMP;
             vec3 n = sample_normal(cls, side, project(x));
             if (dot(dir, n) < 0.0) {
                 n = -n;

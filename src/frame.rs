@@ -26,6 +26,10 @@ pub(crate) fn record(r: &mut Recorder, passes: &mut Passes, needs: &Needs, setti
             passes.normals.record(r, needs)?;
         }
     }
+    if needs.tiles() {
+        // Where rays outside the liquid need not look for a second volume.
+        passes.tiles.record(r, needs)?;
+    }
     // Up to four refractions, and the light they bring back (Imai16 §4.4, §4.5).
     passes.refract.record(r, needs, settings)
 }

@@ -450,7 +450,7 @@ impl Slot {
         let sizes = [
             size(vk::DescriptorType::UNIFORM_BUFFER, 1),
             size(vk::DescriptorType::STORAGE_BUFFER, 5),
-            size(vk::DescriptorType::SAMPLED_IMAGE, 7),
+            size(vk::DescriptorType::SAMPLED_IMAGE, 8),
             size(vk::DescriptorType::STORAGE_IMAGE, 1),
         ];
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER;

@@ -21,6 +21,7 @@ pub enum Id {
     BodyDepthA,
     BodyDepthB,
     BodyNormal,
+    FrontTiles,
     Walk,
     Direction,
     Environment,
@@ -31,7 +32,7 @@ pub enum Id {
 
 impl Id {
     /// Those the renderer makes for itself from [`Needs`], in the order of the memory ledger.
-    pub const OWN: [Id; 14] = [
+    pub const OWN: [Id; 15] = [
         Id::Bounds,
         Id::Visible,
         Id::Draws,
@@ -44,6 +45,7 @@ impl Id {
         Id::BodyDepthA,
         Id::BodyDepthB,
         Id::BodyNormal,
+        Id::FrontTiles,
         Id::Walk,
         Id::Direction,
     ];
@@ -65,6 +67,7 @@ impl Id {
             Id::BodyDepthA => "body depth (smoothed, odd)",
             Id::BodyDepthB => "body depth (smoothed, even)",
             Id::BodyNormal => "body normal (smoothed)",
+            Id::FrontTiles => "front depth tiles",
             Id::Walk => "walk (debug)",
             Id::Direction => "final direction (debug)",
             Id::Environment => "environment",
@@ -84,8 +87,8 @@ pub struct Needs {
     pub splash: u32,
     /// Body particles.
     pub body: u32,
-    /// Front only, or front and back.
-    pub sides: u32,
+    /// Surfaces at which light bends: 1, 2 or 4.
+    pub refractions: u32,
     /// Iterations of plane fitting.
     pub iterations: u32,
     /// Whether hidden particles are dropped before drawing.
@@ -115,10 +118,30 @@ impl Needs {
             size,
             splash: splash as u32,
             body: body as u32,
-            sides: if settings.refractions == 1 { 1 } else { 2 },
+            refractions: settings.refractions,
             iterations: settings.iterations,
             occlusion: settings.occlusion_culling,
             debug,
+        }
+    }
+
+    /// Sides of each class that are drawn: front only, or front and back.
+    pub fn sides(&self) -> u32 {
+        if self.refractions == 1 { 1 } else { 2 }
+    }
+
+    /// Whether rays look for a second volume, and so for tiles of front depths.
+    pub fn tiles(&self) -> bool {
+        self.refractions == 4 && self.splash + self.body > 0
+    }
+
+    /// Final depth and normal of a class; of the other class where this one has no particles, and so no maps: the
+    /// shader then does not look, but something has to be bound.
+    pub(crate) fn maps_or_other(&self, body: bool) -> (Id, Id) {
+        if self.body > 0 && (body || self.splash == 0) {
+            (self.body_depth(), self.body_normal())
+        } else {
+            (Id::SplashDepth, Id::SplashNormal)
         }
     }
 
@@ -148,8 +171,8 @@ impl Needs {
             Some(Spec::Buffer { bytes, usage: usage | B::STORAGE_BUFFER | B::TRANSFER_SRC | B::TRANSFER_DST })
         };
         // One layer a side: front, back.
-        let drawn = |format| image(format, self.sides, true, U::COLOR_ATTACHMENT | U::SAMPLED | U::TRANSFER_SRC);
-        let computed = |format| image(format, self.sides, true, U::STORAGE | U::SAMPLED | U::TRANSFER_SRC);
+        let drawn = |format| image(format, self.sides(), true, U::COLOR_ATTACHMENT | U::SAMPLED | U::TRANSFER_SRC);
+        let computed = |format| image(format, self.sides(), true, U::STORAGE | U::SAMPLED | U::TRANSFER_SRC);
         let placeholder =
             |format| Some(Spec::Image(ImageSpec { format, size: [1, 1], layers: 1, array: true, usage: U::SAMPLED }));
         match id {
@@ -171,6 +194,14 @@ impl Needs {
             Id::BodyDepthA if body && self.iterations >= 1 => computed(F::R32_SFLOAT),
             Id::BodyDepthB if body && self.iterations >= 2 => computed(F::R32_SFLOAT),
             Id::BodyNormal if body && self.iterations >= 1 => computed(F::R32_UINT),
+            // Smallest and largest front depth of each tile.
+            Id::FrontTiles if self.tiles() => Some(Spec::Image(ImageSpec {
+                format: F::R32_SFLOAT,
+                size: self.size.map(|s| s.div_ceil(shader::FRONT_TILE)),
+                layers: 2,
+                array: true,
+                usage: U::STORAGE | U::SAMPLED | U::TRANSFER_SRC,
+            })),
             Id::Walk | Id::Direction if self.debug => {
                 image(F::R32G32B32A32_SFLOAT, 1, false, U::COLOR_ATTACHMENT | U::TRANSFER_SRC)
             }

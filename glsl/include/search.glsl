@@ -100,6 +100,11 @@ float wall_distance(Ray ray, int cls, int side, float t, float sense) {
     return sense * ((-ray.origin.z - d) - t * ray.dir.z);
 }
 
+// Where the line through two samples of f is zero; their middle where it is level.
+float false_position(float a, float fa, float b, float fb) {
+    return fb == fa ? 0.5 * (a + b) : b - fb * (b - a) / (fb - fa);
+}
+
 // Narrows a bracket (f(a) < 0 <= f(b)) by regula falsi (Illinois), by halving while f(b) is a hole. Returns |f|.
 float refine(Ray ray, int cls, int side, float sense, float a, float fa, float b, float fb, out float t) {
     t = b;
@@ -107,7 +112,7 @@ float refine(Ray ray, int cls, int side, float sense, float a, float fa, float b
     bool hole = fb >= HOLE;
     for (int i = 0; i < REFINE_STEPS && abs(f) > frame.search.x; ++i) {
         // Every fourth step halves: where the map jumps, regula falsi alone creeps.
-        t = hole || (i & 3) == 3 ? 0.5 * (a + b) : b - fb * (b - a) / (fb - fa);
+        t = hole || (i & 3) == 3 ? 0.5 * (a + b) : false_position(a, fa, b, fb);
         f = wall_distance(ray, cls, side, t, sense);
         if (f < 0.0) {
             a = t;
@@ -123,7 +128,7 @@ float refine(Ray ray, int cls, int side, float sense, float a, float fa, float b
         }
     }
     // The tolerance only has to find the root; a last step from the bracket without evaluating puts t on it.
-    if (abs(f) <= frame.search.x && !hole) t = b - fb * (b - a) / (fb - fa);
+    if (abs(f) <= frame.search.x && !hole) t = false_position(a, fa, b, fb);
     return abs(f);
 }
 
@@ -133,26 +138,32 @@ struct Walls {
     float sense; // sign of f for the wall ahead; the other wall has the opposite
 };
 
-// What a look at every few pixels up to t finds: the secant method finds a wall, not necessarily the first.
+// Pixels a ray may go before a wall can come near that is `gap` deeper or nearer than it: a continuous wall changes by
+// less than the interpolated spread from pixel to pixel (more counts as a jump), the ray by `slope`.
+float clear_pixels(float gap, float slope) { return gap / (frame.search.z + slope); }
+
+// What a look along the way to t finds: the secant method finds a wall, not necessarily the first.
 const int CLEAR = 0;    // inside all the way
 const int JUMPED = 1;   // inside, but the map ahead jumps: what stands there may hide another wall
 const int BLOCKED = 2;  // outside somewhere, by either wall
 int look_until(Ray ray, int cls, Walls walls, float t) {
     vec2 p0 = project(ray.origin), p1 = project(ray.origin + t * ray.dir);
-    float d0 = -ray.origin.z, d1 = d0 - t * ray.dir.z;
-    float steps = clamp(ceil(distance(p0, p1) / CHECK_PIXELS), 1.0, float(CHECK_STEPS));
-    float before = map_depth(cls, walls.ahead, nearest(p0));
-    float jump = frame.search.z * (1.0 + distance(p0, p1) / steps);
+    float d0 = -ray.origin.z, d1 = d0 - t * ray.dir.z, pixels = max(distance(p0, p1), 1e-6);
+    float slope = abs(d1 - d0) / max(pixels, 1.0);
+    float before = map_depth(cls, walls.ahead, nearest(p0)), stride = CHECK_PIXELS, at = 0.0;
     int found = CLEAR;
-    for (float i = 1.0; i <= steps; ++i) {
-        float share = i / steps;
+    for (int i = 0; i < CHECK_STEPS && at < pixels; ++i) {
+        at = min(at + stride, pixels);
+        float share = at / pixels;
         ivec2 pixel = nearest(mix(p0, p1, share));
         float wall = map_depth(cls, walls.ahead, pixel), other = map_depth(cls, 1 - walls.ahead, pixel);
         float d = d0 * d1 / mix(d1, d0, share);
-        if (i < steps && (wall <= 0.0 || walls.sense * (d - wall) > frame.search.y)) return BLOCKED;
-        if (other > 0.0 && walls.sense * (other - d) > frame.search.y) return BLOCKED;
-        if (abs(wall - before) > jump) found = JUMPED;
+        float gap = walls.sense * (wall - d), other_gap = other > 0.0 ? walls.sense * (d - other) : HOLE;
+        if (at < pixels && (wall <= 0.0 || gap < -frame.search.y)) return BLOCKED;
+        if (other_gap < -frame.search.y) return BLOCKED;
+        if (abs(wall - before) > frame.search.z * (1.0 + stride)) found = JUMPED;
         before = wall;
+        stride = clamp(clear_pixels(min(gap, other_gap), slope), CHECK_PIXELS, CHECK_STRIDE);
     }
     return found;
 }
@@ -172,7 +183,7 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
         float a = 0.0, b = min(-fa / max(abs(ray.dir.z), 1e-6), ray.reach), fb = 0.0;
         for (int i = 0; i < SECANT_STEPS; ++i) {
             fb = wall_distance(ray, cls, side, b, walls.sense);
-            float next = fb == fa ? b : b - fb * (b - a) / (fb - fa);
+            float next = false_position(a, fa, b, fb);
             if (abs(fb) <= frame.search.x) {
                 t = next; // the tolerance only has to find the root; the last step puts t on it
                 int found = look_until(ray, cls, walls, t);
@@ -185,8 +196,9 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
             b = next;
         }
     }
-    // The march: four times as far at a stride while both walls are far, back to half a pixel when one comes near.
+    // The march: half a pixel a stride near a wall, more where none can come near.
     float fine = min(MARCH_PIXELS / max(ray.span, 1e-6), 1.0);
+    float slope = ray.reach * abs(ray.dir.z) / max(ray.span, 1.0); // depth a pixel
     vec2 p0 = project(ray.origin), p1 = project(ray.origin + ray.reach * ray.dir);
     float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);
     bool inside = !on_wall, jumped = false;
@@ -206,6 +218,7 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
             stride = fine;
             continue;
         }
+        float gap = min(-f, other < HOLE ? -other : HOLE);
         if (near) f = wall_distance(ray, cls, walls.ahead, next, walls.sense);
         if (other_near) other = wall_distance(ray, cls, 1 - walls.ahead, next, -walls.sense);
         if (other > frame.search.y && other < HOLE) {
@@ -232,7 +245,7 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
             return OUTCOME_HOLE;
         }
         at = way;
-        stride = near || other_near ? fine : 4.0 * fine;
+        stride = fine * clamp(clear_pixels(gap, slope) / MARCH_PIXELS, 1.0, MARCH_STRIDE / MARCH_PIXELS);
     }
     t = last;
     if (at < 1.0) return OUTCOME_NOT_CONVERGED;
@@ -262,26 +275,34 @@ bool crosses_front(Ray ray, int cls, float middle, float step, out float t, inou
 // view, or ran out of steps, before it left the liquid's box, and `jumped` where it passed behind a surface unseen.
 int find_entry(Ray ray, out float t, out bool unknown, out bool jumped) {
     jumped = false;
-    float steps = clamp(ceil(ray.span / MARCH_PIXELS), 1.0, float(MARCH_STEPS));
     float share = min(MARCH_PIXELS / max(ray.span, 1e-6), 1.0);
-    unknown = ray.leaves || steps * share < 1.0;
-    vec2 p0 = project(ray.origin), p1 = project(ray.origin + ray.reach * ray.dir);
+    float slack = frame.search.z;
+    vec2 p0 = project(ray.origin), p1 = project(ray.origin + ray.reach * ray.dir), way = p1 - p0;
     float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);
-    float low = -ray.origin.z;
-    for (float i = 0.0; i <= steps; ++i) {
-        // One fetch a step and class tells whether a surface is near enough to look closely: within half the spread
-        // that is interpolated, of the depths the ray has in this step.
-        ivec2 pixel = nearest(mix(p0, p1, min(i * share, 1.0)));
-        float high = 1.0 / mix(k0, k1, min((i + 0.5) * share, 1.0));
+    float at = 0.0;
+    for (int i = 0; i < MARCH_STEPS && at <= 1.0; ++i) {
+        // A tile whose surfaces all lie before or behind the ray's way through it is left at once.
+        ivec2 pixel = nearest(p0 + at * way), tile = pixel / FRONT_TILE;
+        vec2 edge = float(FRONT_TILE) * (vec2(tile) + vec2(greaterThan(way, vec2(0.0))));
+        vec2 leave = mix((edge - p0) / way, vec2(1.0), lessThan(abs(way), vec2(1e-6)));
+        float end = clamp(min(leave.x, leave.y), at, 1.0);
+        float d_in = 1.0 / mix(k0, k1, at), d_out = 1.0 / mix(k0, k1, end);
+        float least = texelFetch(front_tiles, ivec3(tile, 0), 0).x, most = texelFetch(front_tiles, ivec3(tile, 1), 0).x;
+        if (max(d_in, d_out) < least - slack || min(d_in, d_out) > most + slack) {
+            at = max(end, at) + 0.25 * share;
+            continue;
+        }
+        // One fetch a step and class tells whether a surface is near enough to look closely: within half the
+        // interpolated spread of the depths the ray has in this step.
+        float low = 1.0 / mix(k0, k1, max(at - 0.5 * share, 0.0)), high = 1.0 / mix(k0, k1, min(at + 0.5 * share, 1.0));
         float front_splash = HAS_SPLASH ? map_depth(CLASS_SPLASH, SIDE_FRONT, pixel) : 0.0;
         float front_body = HAS_BODY ? map_depth(CLASS_BODY, SIDE_FRONT, pixel) : 0.0;
-        float from = min(low, high) - 0.5 * frame.search.z, to = max(low, high) + 0.5 * frame.search.z;
-        low = high;
+        float from = min(low, high) - 0.5 * slack, to = max(low, high) + 0.5 * slack;
         bool splash = front_splash >= from && front_splash <= to, body = front_body >= from && front_body <= to;
         if (splash || body) {
             float t_splash = 0.0, t_body = 0.0;
-            splash = splash && crosses_front(ray, CLASS_SPLASH, i * share, share, t_splash, jumped);
-            body = body && crosses_front(ray, CLASS_BODY, i * share, share, t_body, jumped);
+            splash = splash && crosses_front(ray, CLASS_SPLASH, at, share, t_splash, jumped);
+            body = body && crosses_front(ray, CLASS_BODY, at, share, t_body, jumped);
             if (splash || body) {
                 bool first = splash && (!body || t_splash <= t_body);
                 t = first ? t_splash : t_body;
@@ -289,7 +310,9 @@ int find_entry(Ray ray, out float t, out bool unknown, out bool jumped) {
                 return first ? CLASS_SPLASH : CLASS_BODY;
             }
         }
+        at += share;
     }
     t = 0.0;
+    unknown = ray.leaves || at <= 1.0;
     return -1;
 }

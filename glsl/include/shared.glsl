@@ -6,6 +6,9 @@
 #define IMAGE_GROUP 8
 #define PARTICLE_GROUP 64
 
+// Edge of a tile of front depths, in pixels.
+#define FRONT_TILE 16
+
 // Classes (Imai16 section 4.1) and sides: the layer of a two-layer map.
 #define CLASS_SPLASH 0
 #define CLASS_BODY 1
@@ -51,12 +54,14 @@
 #define FIT_GRAZING_LIMIT 0.01
 #define FIT_UPDATE_LIMIT 4.0
 
-// Search along a ray: secant steps; pixels between the samples that look for an earlier wall, and how many of them at
-// most; pixels a step of a march, and its steps at most; refinements of a bracket.
+// Search along a ray: secant steps; pixels from sample to sample where an earlier wall is looked for, least and most, and
+// how many samples at most; the same for a march; refinements of a bracket.
 #define SECANT_STEPS 10
-#define CHECK_PIXELS 2.0
-#define CHECK_STEPS 16
+#define CHECK_PIXELS 1.0
+#define CHECK_STRIDE 8.0
+#define CHECK_STEPS 64
 #define MARCH_PIXELS 0.5
+#define MARCH_STRIDE 16.0
 #define MARCH_STEPS 1024
 #define REFINE_STEPS 24
 

@@ -35,7 +35,7 @@ impl Cull {
         let host = r.host;
         r.pass("cull", &uses, |r| {
             for (class, splat) in classes(needs) {
-                let key = [u32::from(occlusion && class == CLASS_BODY), u32::from(needs.sides == 2)];
+                let key = [u32::from(occlusion && class == CLASS_BODY), u32::from(needs.sides() == 2)];
                 let make = |key: &[u32; 2]| Pipeline::compute(host, &CULL_COMP, key, size_of::<Splat>() as u32);
                 let pipeline = self.pipelines.get(key, make)?;
                 r.bind(pipeline, &uses)?;

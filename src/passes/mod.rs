@@ -7,6 +7,7 @@ pub(crate) mod plane_fit;
 pub(crate) mod refract;
 pub(crate) mod reset;
 pub(crate) mod splat;
+pub(crate) mod tiles;
 
 use crate::{
     Error,
@@ -27,6 +28,7 @@ pub(crate) struct Passes {
     pub splat: splat::SplatPass,
     pub plane_fit: plane_fit::PlaneFit,
     pub normals: normals::Normals,
+    pub tiles: tiles::Tiles,
     pub refract: refract::Refract,
 }
 
@@ -39,6 +41,7 @@ impl Passes {
             splat: splat::SplatPass::new(limits),
             plane_fit: plane_fit::PlaneFit::default(),
             normals: normals::Normals::default(),
+            tiles: tiles::Tiles::default(),
             refract: refract::Refract::new(host, output),
         }
     }
@@ -49,6 +52,7 @@ impl Passes {
         self.splat.pipelines.destroy(host);
         self.plane_fit.pipelines.destroy(host);
         self.normals.pipelines.destroy(host);
+        self.tiles.pipelines.destroy(host);
         self.refract.pipelines.destroy(host);
     }
 }

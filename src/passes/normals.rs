@@ -27,7 +27,7 @@ impl Normals {
         let pipeline = self.pipelines.get((), |()| Pipeline::compute(host, &NORMALS_COMP, &[], 0))?;
         r.pass("normals", &uses, |r| {
             r.bind(pipeline, &uses)?;
-            r.dispatch(groups(needs.size[0], IMAGE_GROUP), groups(needs.size[1], IMAGE_GROUP), needs.sides);
+            r.dispatch(groups(needs.size[0], IMAGE_GROUP), groups(needs.size[1], IMAGE_GROUP), needs.sides());
             Ok(())
         })
     }

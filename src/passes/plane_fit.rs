@@ -49,7 +49,7 @@ impl PlaneFit {
         let pipeline = self.pipelines.get(key, |key| Pipeline::compute(host, &PLANE_FIT_COMP, key, 0))?;
         r.pass("plane fit", &uses, |r| {
             r.bind(pipeline, &uses)?;
-            r.dispatch(groups(needs.size[0], edge), groups(needs.size[1], edge), needs.sides);
+            r.dispatch(groups(needs.size[0], edge), groups(needs.size[1], edge), needs.sides());
             Ok(())
         })
     }

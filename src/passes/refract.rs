@@ -32,11 +32,10 @@ impl Refract {
 
     pub fn record(&mut self, r: &mut Recorder, needs: &Needs, settings: &Settings) -> Result<(), Error> {
         let (splash, body) = (needs.splash > 0, needs.body > 0);
-        // A class without particles has no maps; the shader then does not look, but something has to be bound.
-        let body_maps = (needs.body_depth(), needs.body_normal());
-        let splash_maps = (Id::SplashDepth, Id::SplashNormal);
-        let (body_depth, body_normal) = if body { body_maps } else { splash_maps };
-        let (splash_depth, splash_normal) = if splash || !body { splash_maps } else { body_maps };
+        let ((body_depth, body_normal), (splash_depth, splash_normal)) =
+            (needs.maps_or_other(true), needs.maps_or_other(false));
+        // Without a second volume there are no tiles, and the shader does not look.
+        let tiles = if needs.tiles() { Id::FrontTiles } else { body_depth };
         let mut uses = vec![
             bound(1, body_depth, Access::FragmentRead),
             bound(2, body_normal, Access::FragmentRead),
@@ -45,6 +44,7 @@ impl Refract {
             bound(5, Id::Environment, Access::FragmentRead),
             bound(6, Id::SceneColor, Access::FragmentRead),
             bound(7, Id::SceneDepth, Access::FragmentRead),
+            bound(8, tiles, Access::FragmentRead),
             used(Id::Output, Access::ColorAttachment),
         ];
         let mut colors = vec![(Id::Output, 0)];

@@ -38,7 +38,7 @@ impl SplatPass {
 
     pub fn record(&mut self, r: &mut Recorder, needs: &Needs) -> Result<(), Error> {
         for (class, mut splat) in classes(needs) {
-            for side in [SIDE_FRONT, SIDE_BACK].into_iter().take(needs.sides as usize) {
+            for side in [SIDE_FRONT, SIDE_BACK].into_iter().take(needs.sides() as usize) {
                 splat.range.w = side;
                 self.draw(r, class, side, &splat)?;
             }

@@ -3,3 +3,4 @@
 
 pub mod normal;
 pub mod optics;
+pub mod tiles;
