@@ -184,6 +184,9 @@ impl Renderer {
             );
             return Err(Error::parameter("particles", count, remedy));
         }
+        if let Some(bad) = particles.ellipsoids.iter().position(|e| !(e.center.is_finite() && e.axes.is_finite())) {
+            return Err(Error::parameter("particles", format!("not finite at {bad}"), "centres and axes are finite"));
+        }
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let mut buffer = Buffer::new(&self.host, Id::Particles.name(), bytes, usage, MemoryLocation::CpuToGpu)?;
         let inverse = 1.0 / particles.radius;
@@ -191,7 +194,7 @@ impl Renderer {
             out.copy_from_slice(bytemuck::bytes_of(&pack(e.center, e.axes * inverse)));
         }
         if let Some(old) = self.particles.replace(buffer) {
-            self.retired.push(self.frame, Doomed::Buffer(old));
+            self.retire(Doomed::Buffer(old));
         }
         let bounds = particles.bounds().unwrap_or_default();
         self.scene = SceneBounds {
@@ -266,12 +269,17 @@ impl Renderer {
                 };
             }
         }
-        // The upload runs with the next frame at the latest; the old map may be seen by the last one.
-        self.retired.push(self.frame + 1, Doomed::Buffer(staging));
+        self.retire(Doomed::Buffer(staging));
         if let Some(old) = self.environment.replace(image) {
-            self.retired.push(self.frame, Doomed::Image(old));
+            self.retire(Doomed::Image(old));
         }
         Ok(())
+    }
+
+    /// Keeps something that recorded commands may still use until the next frame has completed: uploads and copies
+    /// that were recorded since the last frame run before that one.
+    fn retire(&mut self, doomed: Doomed) {
+        self.retired.push(self.frame + 1, doomed);
     }
 
     /// Records one frame into the host's command buffer.
@@ -299,9 +307,9 @@ impl Renderer {
         // The slot's last frame has completed, and with it every frame before.
         self.retired.collect(&self.host, slot.frame);
         let needs = Needs::new(self.size, self.scene.splash, self.scene.body, input.settings, input.debug);
+        self.frame += 1;
         self.table.fit(&self.host, &needs, &mut self.retired, self.frame)?;
         self.table.discard_contents();
-        self.frame += 1;
         slot.frame = self.frame;
 
         let mut block = input.camera.uniforms(input.settings, self.size, self.scene.radius, self.scene.bounds);

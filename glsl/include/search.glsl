@@ -169,7 +169,7 @@ int look_until(Ray ray, int cls, Walls walls, float t) {
 }
 
 // Where a ray inside a volume leaves it. First the secant method from the two ends that a flat wall would give;
-// if that leaves the ray, meets a hole or does not converge, a march of half a pixel a step, then regula falsi.
+// if that leaves the ray, meets a hole or does not converge, a march of a pixel a step, then regula falsi.
 // A ray can also leave through the other wall: the map behind its back, which then lies across its way.
 // `came_from`: the map off which the ray was reflected, or -1: there f starts at zero, and the secant would stay.
 // Returns an outcome; t is the hit, or the last point known to be inside; `side` the map that was hit.
@@ -196,15 +196,15 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
             b = next;
         }
     }
-    // The march: half a pixel a stride near a wall, more where none can come near.
-    float fine = min(MARCH_PIXELS / max(ray.span, 1e-6), 1.0);
+    // The march: a pixel a stride near a wall, more where none can come near.
+    float fine = min(EXIT_PIXELS / max(ray.span, 1e-6), 1.0);
     float slope = ray.reach * abs(ray.dir.z) / max(ray.span, 1.0); // depth a pixel
     vec2 p0 = project(ray.origin), p1 = project(ray.origin + ray.reach * ray.dir);
     float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);
     bool inside = !on_wall, jumped = false;
     float at = 0.0, last = 0.0, f_last = -1.0, other_last = -1.0, wall_last = 0.0;
     // Off a wall the first sample is close to it: within two pixels the ray is inside or it is nowhere.
-    float stride = on_wall ? 0.1 * fine : fine;
+    float stride = on_wall ? 0.05 * fine : fine;
     for (int i = 0; i < MARCH_STEPS && at < 1.0; ++i) {
         float way = min(at + stride, 1.0);
         ivec2 pixel = nearest(mix(p0, p1, way));
@@ -230,7 +230,7 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
             return OUTCOME_HOLE;
         }
         if (f < 0.0) {
-            jumped = jumped || (wall_last > 0.0 && abs(wall - wall_last) > frame.search.z * (1.0 + MARCH_PIXELS * stride / fine));
+            jumped = jumped || (wall_last > 0.0 && abs(wall - wall_last) > frame.search.z * (1.0 + EXIT_PIXELS * stride / fine));
             inside = true;
             last = next;
             f_last = f;
@@ -241,11 +241,11 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
             if (residual <= frame.search.y) return jumped ? OUTCOME_PAST_JUMP : OUTCOME_HIT;
             t = last;
             return OUTCOME_HOLE;
-        } else if (way >= 4.0 * fine) {
+        } else if (way >= 2.0 * fine) {
             return OUTCOME_HOLE;
         }
         at = way;
-        stride = fine * clamp(clear_pixels(gap, slope) / MARCH_PIXELS, 1.0, MARCH_STRIDE / MARCH_PIXELS);
+        stride = fine * clamp(clear_pixels(gap, slope) / EXIT_PIXELS, 1.0, EXIT_STRIDE / EXIT_PIXELS);
     }
     t = last;
     if (at < 1.0) return OUTCOME_NOT_CONVERGED;
@@ -275,7 +275,7 @@ bool crosses_front(Ray ray, int cls, float middle, float step, out float t, inou
 // view, or ran out of steps, before it left the liquid's box, and `jumped` where it passed behind a surface unseen.
 int find_entry(Ray ray, out float t, out bool unknown, out bool jumped) {
     jumped = false;
-    float share = min(MARCH_PIXELS / max(ray.span, 1e-6), 1.0);
+    float share = min(ENTRY_PIXELS / max(ray.span, 1e-6), 1.0);
     float slack = frame.search.z;
     vec2 p0 = project(ray.origin), p1 = project(ray.origin + ray.reach * ray.dir), way = p1 - p0;
     float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);

@@ -25,7 +25,7 @@
 #define PATTERN_BODY_BODY 6
 
 // How a pixel's walk ended. Past a jump: every surface was found, but on the way to one the map ahead jumped, and an
-// unseen wall may stand before it. Other wall: every surface was found, one of them across the ray's way.
+// unseen wall may stand before it, or beside it, where it is not interpolated. Other wall: every surface was found, one of them across the ray's way.
 #define OUTCOME_NO_LIQUID 0
 #define OUTCOME_HIT 1
 #define OUTCOME_LEFT_VIEW 2
@@ -55,13 +55,15 @@
 #define FIT_UPDATE_LIMIT 4.0
 
 // Search along a ray: secant steps; pixels from sample to sample where an earlier wall is looked for, least and most, and
-// how many samples at most; the same for a march; refinements of a bracket.
+// how many samples at most; pixels from sample to sample of the
+// marches to an entry and to an exit, the latter least and most, and samples at most; refinements of a bracket.
 #define SECANT_STEPS 10
 #define CHECK_PIXELS 1.0
 #define CHECK_STRIDE 8.0
 #define CHECK_STEPS 64
-#define MARCH_PIXELS 0.5
-#define MARCH_STRIDE 16.0
+#define ENTRY_PIXELS 0.5
+#define EXIT_PIXELS 1.0
+#define EXIT_STRIDE 16.0
 #define MARCH_STEPS 1024
 #define REFINE_STEPS 24
 
