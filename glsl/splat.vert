@@ -36,8 +36,9 @@ void main() {
 
     vec2 scale = 2.0 / frame.viewport.xy;
 #ifdef QUADS
+    // Half a pixel more each way, as the points have: vertices may snap to sixteenths of a pixel.
     vec2 corner = vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1);
-    gl_Position = vec4(mix(box.xy, box.zw, corner) * scale - 1.0, 0.5, 1.0);
+    gl_Position = vec4(mix(box.xy - 0.5, box.zw + 0.5, corner) * scale - 1.0, 0.5, 1.0);
 #else
     vec2 size = box.zw - box.xy;
     gl_PointSize = max(size.x, size.y) + 1.0;

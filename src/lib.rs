@@ -44,6 +44,7 @@ pub mod renderer;
 mod resources;
 pub mod settings;
 pub mod shader;
+mod slot;
 pub mod targets;
 pub mod twin;
 

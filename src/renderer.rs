@@ -7,11 +7,12 @@ use crate::{
     frame,
     particles::Particles,
     passes::Passes,
-    profile::{FrameTimes, Profiler},
+    profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder, Resource, Table, used},
     resources::{Buffer, Doomed, Image, ImageSpec, Retired},
     settings::{Camera, Settings},
     shader,
+    slot::Slot,
     targets::{self, Id, LedgerEntry, Needs, Spec},
 };
 use ash::vk;
@@ -53,15 +54,6 @@ pub struct FrameInput<'a> {
     pub debug: bool,
 }
 
-/// What belongs to one of the frames in flight.
-struct Slot {
-    profiler: Option<Profiler>,
-    pool: vk::DescriptorPool,
-    frame_block: Buffer,
-    /// Number of the frame last recorded into this slot; 0: none yet.
-    frame: u64,
-}
-
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
 ///
 /// Call [`Renderer::destroy`] when the device is idle; a renderer that is only dropped leaks its Vulkan objects,
@@ -90,9 +82,6 @@ struct SceneBounds {
     body: usize,
     bounds: (Vec3, Vec3),
 }
-
-/// Descriptor sets of one frame: 20 iterations and a dozen others.
-const SETS: u32 = 64;
 
 impl Renderer {
     /// Makes a renderer for outputs of one format: UNORM formats receive sRGB-encoded colour, float formats linear.
@@ -440,53 +429,8 @@ impl Renderer {
         if let Some(mut i) = self.environment.take() {
             i.destroy(&self.host);
         }
-        for mut slot in self.slots.drain(..) {
-            slot.frame_block.destroy(&self.host);
-            // SAFETY: no frame is in flight (contract).
-            unsafe { self.host.device.destroy_descriptor_pool(slot.pool, None) };
-            if let Some(p) = &mut slot.profiler {
-                p.destroy(&self.host.device);
-            }
-        }
+        self.slots.drain(..).for_each(|mut slot| slot.destroy(&self.host));
         self.passes.destroy(&self.host);
-    }
-}
-
-impl Slot {
-    fn new(host: &Host) -> Result<Slot, Error> {
-        let size = |ty, count| vk::DescriptorPoolSize { ty, descriptor_count: count * SETS };
-        let sizes = [
-            size(vk::DescriptorType::UNIFORM_BUFFER, 1),
-            size(vk::DescriptorType::STORAGE_BUFFER, 5),
-            size(vk::DescriptorType::SAMPLED_IMAGE, 8),
-            size(vk::DescriptorType::STORAGE_IMAGE, 1),
-        ];
-        let usage = vk::BufferUsageFlags::UNIFORM_BUFFER;
-        let mut frame_block = Buffer::new(
-            host,
-            Id::FrameBlock.name(),
-            size_of::<shader::Frame>() as u64,
-            usage,
-            MemoryLocation::CpuToGpu,
-        )?;
-        let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(&sizes);
-        // SAFETY: complete info on a live device.
-        let pool = match unsafe { host.device.create_descriptor_pool(&info, None) } {
-            Ok(pool) => pool,
-            Err(e) => {
-                frame_block.destroy(host);
-                return Err(Error::vulkan("descriptor pool")(e));
-            }
-        };
-        match Profiler::new(host) {
-            Ok(profiler) => Ok(Slot { profiler, pool, frame_block, frame: 0 }),
-            Err(e) => {
-                frame_block.destroy(host);
-                // SAFETY: just made, never used.
-                unsafe { host.device.destroy_descriptor_pool(pool, None) };
-                Err(e)
-            }
-        }
     }
 }
 

@@ -280,13 +280,13 @@ int find_entry(Ray ray, out float t, out bool unknown, out bool jumped) {
     vec2 p0 = project(ray.origin), p1 = project(ray.origin + ray.reach * ray.dir), way = p1 - p0;
     float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);
     float at = 0.0;
-    for (int i = 0; i < MARCH_STEPS && at <= 1.0; ++i) {
+    for (int i = 0; i < MARCH_STEPS && at - 0.5 * share < 1.0; ++i) {
         // A tile whose surfaces all lie before or behind the ray's way through it is left at once.
-        ivec2 pixel = nearest(p0 + at * way), tile = pixel / FRONT_TILE;
+        ivec2 pixel = nearest(p0 + min(at, 1.0) * way), tile = pixel / FRONT_TILE;
         vec2 edge = float(FRONT_TILE) * (vec2(tile) + vec2(greaterThan(way, vec2(0.0))));
         vec2 leave = mix((edge - p0) / way, vec2(1.0), lessThan(abs(way), vec2(1e-6)));
-        float end = clamp(min(leave.x, leave.y), at, 1.0);
-        float d_in = 1.0 / mix(k0, k1, at), d_out = 1.0 / mix(k0, k1, end);
+        float end = clamp(min(leave.x, leave.y), min(at, 1.0), 1.0);
+        float d_in = 1.0 / mix(k0, k1, max(at - 0.5 * share, 0.0)), d_out = 1.0 / mix(k0, k1, end);
         float least = texelFetch(front_tiles, ivec3(tile, 0), 0).x, most = texelFetch(front_tiles, ivec3(tile, 1), 0).x;
         if (max(d_in, d_out) < least - slack || min(d_in, d_out) > most + slack) {
             at = max(end, at) + 0.25 * share;
@@ -294,10 +294,10 @@ int find_entry(Ray ray, out float t, out bool unknown, out bool jumped) {
         }
         // One fetch a step and class tells whether a surface is near enough to look closely: within half the
         // interpolated spread of the depths the ray has in this step.
-        float low = 1.0 / mix(k0, k1, max(at - 0.5 * share, 0.0)), high = 1.0 / mix(k0, k1, min(at + 0.5 * share, 1.0));
+        float high = 1.0 / mix(k0, k1, min(at + 0.5 * share, 1.0));
         float front_splash = HAS_SPLASH ? map_depth(CLASS_SPLASH, SIDE_FRONT, pixel) : 0.0;
         float front_body = HAS_BODY ? map_depth(CLASS_BODY, SIDE_FRONT, pixel) : 0.0;
-        float from = min(low, high) - 0.5 * slack, to = max(low, high) + 0.5 * slack;
+        float from = min(d_in, high) - 0.5 * slack, to = max(d_in, high) + 0.5 * slack;
         bool splash = front_splash >= from && front_splash <= to, body = front_body >= from && front_body <= to;
         if (splash || body) {
             float t_splash = 0.0, t_body = 0.0;
@@ -313,6 +313,6 @@ int find_entry(Ray ray, out float t, out bool unknown, out bool jumped) {
         at += share;
     }
     t = 0.0;
-    unknown = ray.leaves || at <= 1.0;
+    unknown = ray.leaves || at - 0.5 * share < 1.0;
     return -1;
 }

@@ -18,7 +18,6 @@ pub struct Session<'a> {
     /// The renderer, for particles, needs and memory.
     pub renderer: Renderer,
     canvas: Canvas<'a>,
-    size: [u32; 2],
 }
 
 impl<'a> Session<'a> {
@@ -32,13 +31,20 @@ impl<'a> Session<'a> {
             Canvas::new(gpu, FORMAT, 16, size)
         });
         match ready {
-            Ok(canvas) => Ok(Session { gpu, renderer, canvas, size }),
+            Ok(canvas) => Ok(Session { gpu, renderer, canvas }),
             Err(e) => {
                 // SAFETY: `run` waits, so nothing is in flight.
                 unsafe { renderer.destroy() };
                 Err(e)
             }
         }
+    }
+
+    /// Changes the size of frames to come.
+    pub fn resize(&mut self, size: [u32; 2]) -> Result<(), HostError> {
+        self.renderer.resize(size)?;
+        self.canvas = Canvas::new(self.gpu, FORMAT, 16, size)?;
+        Ok(())
     }
 
     /// Renders one frame into the session's own output (`input.output` is ignored) and waits for it.
@@ -63,7 +69,11 @@ impl<'a> Session<'a> {
     pub fn words(&mut self, id: Id, layer: u32) -> Result<Option<Vec<u32>>, HostError> {
         let bytes = match self.renderer.spec(id) {
             None => return Ok(None),
-            Some(Spec::Image(spec)) if layer >= spec.layers || spec.size == [1, 1] => return Ok(None),
+            Some(Spec::Image(spec))
+                if layer >= spec.layers || !spec.usage.contains(vk::ImageUsageFlags::TRANSFER_SRC) =>
+            {
+                return Ok(None);
+            }
             Some(Spec::Image(spec)) => {
                 let texel = if spec.format == FORMAT { 16 } else { 4 };
                 u64::from(spec.size[0]) * u64::from(spec.size[1]) * texel

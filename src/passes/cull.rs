@@ -19,11 +19,12 @@ pub(crate) struct Cull {
 impl Cull {
     pub fn record(&mut self, r: &mut Recorder, needs: &Needs) -> Result<(), Error> {
         let occlusion = needs.spec(Id::Bounds).is_some();
-        // Where nothing is bounded, the shader does not look; something has to be bound all the same.
+        // Where nothing is bounded, the shader does not look; something has to be bound all the same, and validation
+        // takes it for read.
         let bounds = if occlusion {
             bound(2, Id::Bounds, Access::ComputeRead)
         } else {
-            bound(2, Id::Visible, Access::ComputeReadWrite)
+            bound(2, Id::Particles, Access::ComputeRead)
         };
         let uses = [
             bound(1, Id::Particles, Access::ComputeRead),

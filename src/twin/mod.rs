@@ -1,6 +1,15 @@
 //! CPU twins: the same passes as plain functions on slices, written from the formulas, with no Vulkan in them.
 //! Tests feed them the GPU's own inputs and compare.
 
+pub mod background;
+pub mod cull;
 pub mod normal;
+pub mod normals;
+pub mod occlude;
 pub mod optics;
+pub mod plane_fit;
+pub mod quadric;
+pub mod refract;
+pub mod search;
+pub mod splat;
 pub mod tiles;

@@ -4,3 +4,7 @@ mod house;
 #[cfg(feature = "io")]
 mod io;
 mod prepare;
+mod twin_normals;
+mod twin_optics;
+mod twin_plane_fit;
+mod twin_refract;

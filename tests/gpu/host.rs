@@ -29,8 +29,8 @@ fn ball() -> Particles {
 
 /// A renderer on a device of its own, given to `body`, then destroyed.
 fn with_renderer(driver: &Driver, format: vk::Format, frames: u32, body: impl FnOnce(&Gpu, &mut Renderer)) {
-    let device = driver.instance().pick(Some(&driver.name)).expect("it was there a moment ago");
-    let gpu = Gpu::new(driver.instance(), device).expect("device");
+    let device = driver.instance.pick(Some(&driver.name)).expect("it was there a moment ago");
+    let gpu = Gpu::new(driver.instance, device).expect("device");
     // SAFETY: the device outlives the renderer and has the required features.
     let mut renderer = unsafe { Renderer::new(gpu.host(frames), format) }.expect("renderer");
     renderer.resize(SIZE).expect("size");

@@ -1,5 +1,14 @@
 //! Passes on every Vulkan driver there is, against their CPU twins, with core and synchronization validation on.
 
+mod access;
+mod analytic;
+mod cull;
 mod host;
+mod normals;
+mod occlude;
+mod plane_fit;
+mod refract;
 mod smoke;
+mod splat;
 mod support;
+mod tiles;

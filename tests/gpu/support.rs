@@ -7,7 +7,7 @@ use meniscus::{
     shader::Frame,
     targets::Id,
 };
-use std::collections::HashMap;
+use std::{cell::RefCell, collections::HashMap};
 
 /// One frame's input.
 #[derive(Clone)]
@@ -44,25 +44,18 @@ impl Shot {
 }
 
 /// One driver: an instance of its own, so that its validation messages are its own too.
-pub struct Driver {
-    instance: Instance,
+pub struct Driver<'a> {
+    pub instance: &'a Instance,
+    /// One renderer for all of a test's frames: sizes, particles and settings change under it as they do in an engine.
+    session: RefCell<Session<'a>>,
     pub name: String,
 }
 
-impl Driver {
-    pub fn instance(&self) -> &Instance {
-        &self.instance
-    }
-
-    pub fn is_swiftshader(&self) -> bool {
-        self.name.contains("SwiftShader")
-    }
-
+impl Driver<'_> {
     /// Renders a case (with `debug` targets) and reads everything back.
     pub fn shoot(&self, case: &Case) -> Shot {
-        let device = self.instance.pick(Some(&self.name)).expect("it was there a moment ago");
-        let gpu = Gpu::new(&self.instance, device).expect("device");
-        let mut session = Session::new(&gpu, case.size, &Equirect::procedural_sky()).expect("session");
+        let session = &mut *self.session.borrow_mut();
+        session.resize(case.size).expect("size");
         session.renderer.set_particles(&case.particles).expect("particles");
         let input = FrameInput {
             slot: 0,
@@ -83,7 +76,6 @@ impl Driver {
             }
         }
         let picture = session.picture().expect("picture");
-        session.end();
         let bounds = case.particles.bounds().unwrap_or_default();
         let mut frame = case.camera.uniforms(&case.settings, case.size, case.particles.radius, bounds);
         frame.scene.w = f32::from(case.eye_inside);
@@ -105,11 +97,19 @@ pub fn each_driver(test: impl Fn(&Driver)) {
     }
     for device in usable {
         let instance = Instance::new(true).expect("validation layer: run ./setup.sh");
-        let driver = Driver { instance, name: device.name };
-        println!("driver: {} ({})", driver.name, device.driver);
-        test(&driver);
-        let messages = driver.instance.messages();
-        assert!(messages.is_empty(), "{}: validation:\n{}", driver.name, messages.join("\n"));
+        println!("driver: {} ({})", device.name, device.driver);
+        let name = device.name.clone();
+        let found = instance.pick(Some(&name)).expect("it was there a moment ago");
+        // What the inner scope does not destroy is among the messages.
+        {
+            let gpu = Gpu::new(&instance, found).expect("device");
+            let session = Session::new(&gpu, [1, 1], &Equirect::procedural_sky()).expect("session");
+            let driver = Driver { instance: &instance, session: RefCell::new(session), name: name.clone() };
+            test(&driver);
+            driver.session.into_inner().end();
+        }
+        let messages = instance.messages();
+        assert!(messages.is_empty(), "{name}: validation:\n{}", messages.join("\n"));
     }
 }
 

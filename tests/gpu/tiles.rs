@@ -7,7 +7,8 @@ use meniscus::{Settings, shader::FRONT_TILE, targets::Id, twin::tiles::tiles};
 #[test]
 fn ranges_equal_the_twin() {
     // Sizes that end inside a tile, and clouds with either class, both and few.
-    for (size, splash, body) in [([173u32, 131u32], 60, 300), ([64, 48], 30, 0), ([160, 120], 0, 200), ([33, 17], 1, 1)] {
+    for (size, splash, body) in [([173u32, 131u32], 60, 300), ([64, 48], 30, 0), ([160, 120], 0, 200), ([33, 17], 1, 1)]
+    {
         let case = Case {
             particles: random_cloud(11, 0.04, Vec3::splat(-0.6), Vec3::splat(0.6), splash, body),
             camera: camera(Vec3::new(0.2, 0.1, 2.0), Vec3::ZERO, size),

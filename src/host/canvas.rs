@@ -1,0 +1,114 @@
+//! A colour image of the host's.
+
+use super::{Gpu, HostError, vulkan};
+use ash::vk;
+use gpu_allocator::{MemoryLocation, vulkan::Allocation};
+
+/// A colour image to render into and read back.
+pub struct Canvas<'a> {
+    gpu: &'a Gpu<'a>,
+    image: vk::Image,
+    /// View for [`crate::FrameInput::output`].
+    pub view: vk::ImageView,
+    size: [u32; 2],
+    texel: u64,
+    allocation: Option<Allocation>,
+}
+
+impl<'a> Canvas<'a> {
+    /// A colour image with `texel` bytes a pixel.
+    pub fn new(gpu: &'a Gpu<'a>, format: vk::Format, texel: u64, size: [u32; 2]) -> Result<Canvas<'a>, HostError> {
+        let spec = crate::resources::ImageSpec {
+            format,
+            size,
+            layers: 1,
+            array: false,
+            usage: vk::ImageUsageFlags::COLOR_ATTACHMENT
+                | vk::ImageUsageFlags::TRANSFER_SRC
+                | vk::ImageUsageFlags::SAMPLED
+                | vk::ImageUsageFlags::TRANSFER_DST,
+        };
+        // SAFETY: complete info on a live device.
+        let image = unsafe { gpu.device.create_image(&spec.info(), None) }.map_err(vulkan("canvas"))?;
+        let mut canvas = Canvas { gpu, image, view: vk::ImageView::null(), size, texel, allocation: None };
+        // SAFETY: the image was just made; its memory is kept until it is destroyed.
+        unsafe {
+            let requirements = gpu.device.get_image_memory_requirements(image);
+            let allocation = gpu.allocate("canvas", requirements, MemoryLocation::GpuOnly, false)?;
+            let bound = gpu.device.bind_image_memory(image, allocation.memory(), allocation.offset());
+            canvas.allocation = Some(allocation);
+            bound.map_err(vulkan("canvas"))?;
+            let info = vk::ImageViewCreateInfo::default()
+                .image(image)
+                .view_type(vk::ImageViewType::TYPE_2D)
+                .format(format)
+                .subresource_range(crate::access::whole(vk::ImageAspectFlags::COLOR));
+            canvas.view = gpu.device.create_image_view(&info, None).map_err(vulkan("canvas"))?;
+        }
+        Ok(canvas)
+    }
+
+    /// Records a barrier between two accesses; `from` may be `UNDEFINED` with everything before.
+    pub fn transition(&self, cmd: vk::CommandBuffer, from: vk::ImageLayout, to: vk::ImageLayout) {
+        let all = vk::PipelineStageFlags2::ALL_COMMANDS;
+        let memory = vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE;
+        let barrier = [vk::ImageMemoryBarrier2::default()
+            .src_stage_mask(all)
+            .src_access_mask(memory)
+            .old_layout(from)
+            .dst_stage_mask(all)
+            .dst_access_mask(memory)
+            .new_layout(to)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .image(self.image)
+            .subresource_range(crate::access::whole(vk::ImageAspectFlags::COLOR))];
+        // SAFETY: `cmd` is recording outside rendering; the image is alive and in the layout `from`.
+        unsafe {
+            self.gpu.device.cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default().image_memory_barriers(&barrier))
+        };
+    }
+
+    /// Records a clear of the whole image, which is in `layout`.
+    pub fn clear(&self, cmd: vk::CommandBuffer, layout: vk::ImageLayout, value: [f32; 4]) {
+        let range = [crate::access::whole(vk::ImageAspectFlags::COLOR)];
+        let value = vk::ClearColorValue { float32: value };
+        // SAFETY: `cmd` is recording outside rendering; the image is alive, in this layout, with TRANSFER_DST.
+        unsafe { self.gpu.device.cmd_clear_color_image(cmd, self.image, layout, &value, &range) };
+    }
+
+    /// The pixels, row by row, after a frame that left them in `COLOR_ATTACHMENT_OPTIMAL`.
+    pub fn read(&self) -> Result<Vec<u8>, HostError> {
+        let bytes = u64::from(self.size[0]) * u64::from(self.size[1]) * self.texel;
+        self.gpu.read_back(bytes, |cmd, buffer| {
+            self.transition(cmd, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
+            let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
+            let extent = vk::Extent3D { width: self.size[0], height: self.size[1], depth: 1 };
+            let copy = vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent);
+            // SAFETY: `cmd` is recording; the buffer holds the whole image.
+            unsafe {
+                self.gpu.device.cmd_copy_image_to_buffer(
+                    cmd,
+                    self.image,
+                    vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+                    buffer,
+                    &[copy],
+                )
+            };
+            Ok(())
+        })
+    }
+}
+
+impl Drop for Canvas<'_> {
+    fn drop(&mut self) {
+        // SAFETY: `Gpu::run` waits, so nothing is in flight.
+        unsafe {
+            self.gpu.device.destroy_image_view(self.view, None);
+            self.gpu.device.destroy_image(self.image, None);
+        }
+        if let Some(allocation) = self.allocation.take() {
+            self.gpu.free(allocation);
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Twin of `glsl/plane_fit.comp`: one iteration of plane fitting (Imai16 §4.3) on one layer of the body.
+//!
+//! The shader measures everything from the pixel's own point so that nothing large cancels in 32 bits; here the
+//! formulas stand as printed, in 64 bits, on eye-space points.
+
+use super::normal::decode_normal;
+use crate::{settings::Weighting, shader::Frame};
+use glam::{DVec2, DVec3};
+
+/// What a window's plane is, and eq. (5) makes of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// |Σ w ñ| / Σ w: 1 where all normals agree, 0 where they cancel.
+    pub agreement: f64,
+    /// |n·v|, both unit vectors: the divisor of eq. (5).
+    pub facing: f64,
+    /// Depth at which the view ray meets the plane.
+    pub depth: f64,
+}
+
+/// What became of a pixel's depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// No surface to fit (0: none, negative: behind the near plane); passed through.
+    Passed,
+    /// On its plane now.
+    Fitted,
+    /// Kept: the normals of the window cancel.
+    ZeroNormal,
+    /// Kept: the view ray runs along the plane.
+    Grazing,
+    /// Kept: the plane is too far off, or before the near plane.
+    Unbounded,
+}
+
+/// One iteration's result, pixel by pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// Depths after it.
+    pub depth: Vec<f32>,
+    /// What became of each.
+    pub outcome: Vec<Outcome>,
+    /// The planes; `None` where there was nothing to fit.
+    pub plane: Vec<Option<Plane>>,
+}
+
+impl Fit {
+    /// How many pixels ended so.
+    pub fn count(&self, outcome: Outcome) -> u32 {
+        self.outcome.iter().filter(|o| **o == outcome).count() as u32
+    }
+}
+
+/// Below this agreement the sum of normals has no direction.
+pub const LEAST_AGREEMENT: f64 = 1e-6;
+
+/// Fits every pixel of one layer; `depth` and `normal` (packed, unsmoothed) row by row, `window` in pixels.
+pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], window: u32, weighting: Weighting) -> Fit {
+    let (width, height) = (frame.viewport.x as i32, frame.viewport.y as i32);
+    let reach = window as i32 / 2;
+    let sigma = f64::from(frame.smoothing.x);
+    let index = |x: i32, y: i32| (y * width + x) as usize;
+    let points: Vec<DVec3> = (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| view_ray(frame, x, y) * f64::from(depth[index(x, y)]))
+        .collect();
+    let normals: Vec<DVec3> = normal.iter().map(|n| decode_normal(*n).as_dvec3()).collect();
+
+    let mut fit =
+        Fit { depth: depth.to_vec(), outcome: vec![Outcome::Passed; depth.len()], plane: vec![None; depth.len()] };
+    for y in 0..height {
+        for x in 0..width {
+            let i = index(x, y);
+            if depth[i] <= 0.0 {
+                continue;
+            }
+            let mut normal_sum = DVec3::ZERO;
+            let mut point_sum = DVec3::ZERO;
+            let mut total = 0.0;
+            for ny in (y - reach).max(0)..=(y + reach).min(height - 1) {
+                for nx in (x - reach).max(0)..=(x + reach).min(width - 1) {
+                    let j = index(nx, ny);
+                    if depth[j] <= 0.0 {
+                        continue;
+                    }
+                    let apart = points[j] - points[i];
+                    let square = match weighting {
+                        Weighting::ViewDependent => apart.z * apart.z,
+                        Weighting::Euclidean => apart.length_squared(),
+                    };
+                    let w = (-square / (sigma * sigma)).exp(); // eq. (2)
+                    normal_sum += w * normals[j];
+                    point_sum += w * points[j];
+                    total += w;
+                }
+            }
+            let n = normal_sum.normalize_or_zero(); // eq. (3)
+            let d = n.dot(point_sum / total); // eq. (4)
+            let v = view_ray(frame, x, y).normalize();
+            let z = d * v.z / n.dot(v); // eq. (5)
+            let plane = Plane { agreement: normal_sum.length() / total, facing: n.dot(v).abs(), depth: -z };
+            fit.outcome[i] = judge(frame, depth[i], &plane);
+            fit.plane[i] = Some(plane);
+            if fit.outcome[i] == Outcome::Fitted {
+                fit.depth[i] = plane.depth as f32;
+            }
+        }
+    }
+    fit
+}
+
+/// Whether eq. (5) can be trusted; methods.md §3 lists where it fails.
+fn judge(frame: &Frame, own: f32, plane: &Plane) -> Outcome {
+    let update = (plane.depth - f64::from(own)).abs();
+    if plane.agreement < LEAST_AGREEMENT {
+        Outcome::ZeroNormal
+    } else if plane.facing < f64::from(frame.smoothing.z) {
+        Outcome::Grazing
+    } else if update.is_nan() || update > f64::from(frame.smoothing.y) || plane.depth < f64::from(frame.viewport.z) {
+        Outcome::Unbounded
+    } else {
+        Outcome::Fitted
+    }
+}
+
+/// Direction v = (vx, vy, -1) of the view ray through a pixel's centre: its point at depth d is v d.
+pub fn view_ray(frame: &Frame, x: i32, y: i32) -> DVec3 {
+    let to_pixel = frame.to_pixel.as_dvec4();
+    let center = DVec2::new(f64::from(x), f64::from(y)) + 0.5;
+    ((center - DVec2::new(to_pixel.z, to_pixel.w)) / DVec2::new(to_pixel.x, to_pixel.y)).extend(-1.0)
+}

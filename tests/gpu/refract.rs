@@ -1,0 +1,194 @@
+//! The refraction pass against its twin, which walks in the GPU's own four maps.
+
+use crate::support::{Case, Driver, Shot, camera, each_driver, random_cloud};
+use glam::{DVec3, Vec3};
+use meniscus::{
+    Equirect, Fresnel, Particles, Settings,
+    shader::{OUTCOME_HIT, PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH_SPLASH},
+    targets::{Id, Needs},
+    twin::{
+        refract::{Walk, walk},
+        search::{Map, Maps},
+    },
+};
+use rayon::prelude::*;
+
+const SIZE: [u32; 2] = [240, 180];
+
+/// The maps that the refraction pass has read.
+struct OwnMaps([[(Vec<f32>, Vec<u32>); 2]; 2]);
+
+impl OwnMaps {
+    fn of(case: &Case, shot: &Shot) -> OwnMaps {
+        let (splash, body) = (case.particles.splash_count, case.particles.body_count());
+        let needs = Needs::new(case.size, splash, body, &case.settings, true);
+        let ids = [(Id::SplashDepth, Id::SplashNormal), (needs.body_depth(), needs.body_normal())];
+        OwnMaps(ids.map(|(depth, normal)| {
+            [0, 1].map(|side| {
+                let words = shot.words(normal, side).unwrap_or_default().to_vec();
+                (shot.floats(depth, side).unwrap_or_default(), words)
+            })
+        }))
+    }
+
+    fn twin<'a>(&'a self, shot: &'a Shot) -> Maps<'a> {
+        let maps = self.0.each_ref().map(|class| class.each_ref().map(|(depth, normal)| Map { depth, normal }));
+        Maps { frame: &shot.frame, maps }
+    }
+}
+
+/// The volume a pattern starts with: 0 none, 1 splash, 2 body.
+fn first_volume(pattern: u32) -> u32 {
+    match pattern {
+        PATTERN_NONE => 0,
+        p if p < PATTERN_SPLASH_SPLASH => p,
+        p => 1 + u32::from(p >= PATTERN_BODY_SPLASH),
+    }
+}
+
+/// Angle between two directions.
+pub fn degrees(a: DVec3, b: DVec3) -> f64 {
+    a.cross(b).length().atan2(a.dot(b)).to_degrees()
+}
+
+/// One pixel as the GPU has walked it, and as the twin has.
+struct Pair {
+    index: usize,
+    pattern: u32,
+    outcome: u32,
+    length: f64,
+    angle: f64,
+    color: Vec3,
+    twin: Walk,
+}
+
+/// Every pixel of a frame, or every fourth: the twin's march is slow.
+fn pairs(driver: &Driver, case: &Case, sky: &Equirect) -> Vec<Pair> {
+    let shot = driver.shoot(case);
+    let (walks, directions) = (shot.floats(Id::Walk, 0).unwrap(), shot.floats(Id::Direction, 0).unwrap());
+    let numbers = walks.iter().chain(&directions).chain(shot.picture.as_flattened());
+    assert!(numbers.into_iter().all(|v| v.is_finite()), "{}: not finite", driver.name);
+    let own = OwnMaps::of(case, &shot);
+    let maps = own.twin(&shot);
+    let width = case.size[0] as usize;
+    let chosen = |i: &usize| case.settings.refractions == 1 || (i % width + i / width * 2) % 4 == 0;
+    let pixels: Vec<usize> = (0..walks.len() / 4).filter(chosen).collect();
+    let pair = |index: usize| {
+        let twin = walk(&maps, &case.settings, sky, [index % width, index / width]);
+        let (w, d) = (&walks[4 * index..], &directions[4 * index..]);
+        let angle = degrees(DVec3::new(f64::from(d[0]), f64::from(d[1]), f64::from(d[2])), twin.direction);
+        let color = Vec3::from(shot.picture[index]);
+        Pair { index, pattern: w[0] as u32, outcome: w[1] as u32, length: f64::from(w[3]), angle, color, twin }
+    };
+    pixels.into_par_iter().map(pair).collect()
+}
+
+/// Drivers compute atan, acos and exp with errors of up to 1e-4 and the sky's steps between texels are up to 0.5,
+/// so this much of the light plus as much of a dark grey.
+fn same_color(pair: &Pair, tolerance: f32) -> bool {
+    let limit = tolerance * (pair.twin.color + 0.5);
+    (pair.color - pair.twin.color).abs().cmple(limit).all()
+}
+
+#[track_caller]
+fn at_least(what: &str, driver: &Driver, pairs: &[&Pair], share: f64, good: impl Fn(&Pair) -> bool) {
+    let bad: Vec<_> = pairs.iter().filter(|p| !good(p)).collect();
+    let found = 1.0 - bad.len() as f64 / pairs.len().max(1) as f64;
+    println!("    {what}: {:.2} % of {}", 100.0 * found, pairs.len());
+    let example = bad.first().map(|p| (p.index, p.angle, p.pattern, p.outcome, p.length, p.color, p.twin));
+    assert!(found >= share, "{}: {what} on {:.2} %: {example:?}", driver.name, 100.0 * found);
+}
+
+fn compare(driver: &Driver, case: &Case, sky: &Equirect) {
+    let s = &case.settings;
+    println!("  refractions {}, reflections {}, {:?}:", s.refractions, s.internal_reflections, s.fresnel);
+    let pairs = pairs(driver, case, sky);
+    for pair in &pairs {
+        let (gpu, twin) = (first_volume(pair.pattern), first_volume(pair.twin.pattern));
+        assert_eq!(gpu, twin, "{}: first volume of pixel {}", driver.name, pair.index);
+    }
+    let liquid: Vec<_> = pairs.iter().filter(|p| p.pattern != PATTERN_NONE).collect();
+    let other: Vec<_> = pairs.iter().filter(|p| p.pattern == PATTERN_NONE).collect();
+    assert!(liquid.len() > 500, "{}: only {} pixels of liquid", driver.name, liquid.len());
+    at_least("straight through", driver, &other, 1.0, |p| p.angle <= 0.02 && same_color(p, 0.01));
+    if s.refractions == 1 {
+        // No search: the bent direction up to single precision. Its colour crosses the sun's edge now and then.
+        at_least("direction within 0.02 degrees", driver, &liquid, 1.0, |p| p.angle <= 0.02);
+        at_least("colour", driver, &liquid, 0.999, |p| same_color(p, 0.01));
+        return;
+    }
+    for outcome in 1..=7 {
+        let count =
+            |hit: &dyn Fn(&&&Pair) -> bool| 100.0 * liquid.iter().filter(hit).count() as f64 / liquid.len() as f64;
+        let (gpu, twin) = (count(&|p| p.outcome == outcome), count(&|p| p.twin.outcome == outcome));
+        println!("    outcome {outcome}: {gpu:.1} % (twin {twin:.1} %)");
+    }
+    let hit: Vec<_> = liquid.iter().copied().filter(|p| p.outcome == OUTCOME_HIT).collect();
+    at_least("pixels that hit", driver, &liquid, 0.2, |p| p.outcome == OUTCOME_HIT);
+    // Secant and regula falsi stop within a thousandth of a radius; a march of half a pixel may miss a wall that
+    // a march of an eighth meets.
+    at_least("direction within 0.2 degrees", driver, &hit, 0.99, |p| p.angle <= 0.2);
+    at_least("length within 1 %", driver, &hit, 0.985, |p| (p.length - p.twin.length).abs() <= 0.01 * p.twin.length);
+    at_least("pattern", driver, &hit, 0.985, |p| p.pattern == p.twin.pattern);
+    let agree: Vec<_> = hit.into_iter().filter(|p| p.angle <= 0.2).collect();
+    at_least("colour", driver, &agree, 0.99, |p| same_color(p, 0.01));
+}
+
+fn optics(refractions: u32, internal_reflections: u32, fresnel: Fresnel, absorption: Vec3) -> Settings {
+    Settings { refractions, internal_reflections, fresnel, absorption, ..Settings::default() }
+}
+
+const CLEAR: Vec3 = Vec3::ZERO;
+
+#[cfg(feature = "io")]
+#[test]
+fn a_dam_break_is_walked_as_its_twin_walks_it() {
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/dam_break.bgeo"));
+    let file = meniscus::io::particles::read(path).expect("the asset");
+    let middle = file.positions.iter().sum::<DVec3>() / file.positions.len() as f64;
+    let positions: Vec<Vec3> = file.positions.iter().map(|p| (*p - middle).as_vec3()).collect();
+    let input = meniscus::prepare::Input { positions: &positions, radius: 0.025, classes: None, ellipsoids: None };
+    let (particles, _) = meniscus::prepare::prepare(&input, &meniscus::prepare::Options::default()).expect("prepared");
+    let (low, high) = particles.bounds().unwrap();
+    let eye = 0.5 * (low + high) + 0.8 * (high - low).length() * Vec3::new(0.5, 0.45, 0.75).normalize();
+    let camera = camera(eye, 0.5 * (low + high), SIZE);
+    let tinted = Vec3::new(2.0, 0.7, 0.3);
+    let sky = Equirect::procedural_sky();
+    each_driver(|driver| {
+        for settings in [
+            optics(4, 4, Fresnel::Schlick, CLEAR),
+            optics(4, 0, Fresnel::Exact, tinted),
+            optics(2, 4, Fresnel::Exact, tinted),
+            optics(2, 0, Fresnel::Schlick, CLEAR),
+            optics(1, 0, Fresnel::Schlick, tinted),
+            optics(1, 4, Fresnel::Exact, CLEAR),
+        ] {
+            compare(
+                driver,
+                &Case { particles: particles.clone(), camera, settings, size: SIZE, eye_inside: false },
+                &sky,
+            );
+        }
+    });
+}
+
+#[test]
+fn random_clouds_are_walked_as_their_twin_walks_them() {
+    let sky = Equirect::procedural_sky();
+    let tinted = Vec3::new(0.2, 1.5, 3.0);
+    let cloud = |seed, splash, body| -> Particles {
+        random_cloud(seed, 0.12, Vec3::new(-0.8, -0.6, -0.5), Vec3::new(0.8, 0.6, 0.5), splash, body)
+    };
+    each_driver(|driver| {
+        for (particles, settings) in [
+            (cloud(1, 12, 40), optics(4, 4, Fresnel::Exact, tinted)),
+            (cloud(2, 12, 40), optics(4, 0, Fresnel::Schlick, CLEAR)),
+            (cloud(3, 12, 40), optics(1, 4, Fresnel::Schlick, tinted)),
+            (cloud(4, 12, 0), optics(4, 4, Fresnel::Schlick, tinted)),
+            (cloud(5, 0, 40), optics(2, 4, Fresnel::Exact, CLEAR)),
+        ] {
+            let camera = camera(Vec3::new(0.3, 0.4, 2.2), Vec3::ZERO, SIZE);
+            compare(driver, &Case { particles, camera, settings, size: SIZE, eye_inside: false }, &sky);
+        }
+    });
+}
