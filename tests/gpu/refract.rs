@@ -71,7 +71,7 @@ fn pairs(driver: &Driver, case: &Case, sky: &Equirect) -> Vec<Pair> {
     let own = OwnMaps::of(case, &shot);
     let maps = own.twin(&shot);
     let width = case.size[0] as usize;
-    let chosen = |i: &usize| case.settings.refractions == 1 || (i % width + i / width * 2) % 4 == 0;
+    let chosen = |i: &usize| case.settings.refractions == 1 || (i % width + i / width * 2).is_multiple_of(4);
     let pixels: Vec<usize> = (0..walks.len() / 4).filter(chosen).collect();
     let pair = |index: usize| {
         let twin = walk(&maps, &case.settings, sky, [index % width, index / width]);
