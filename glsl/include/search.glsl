@@ -138,9 +138,13 @@ struct Walls {
     float sense; // sign of f for the wall ahead; the other wall has the opposite
 };
 
-// Pixels a ray may go before a wall can come near that is `gap` deeper or nearer than it: a continuous wall changes by
-// less than the interpolated spread from pixel to pixel (more counts as a jump), the ray by `slope`.
-float clear_pixels(float gap, float slope) { return gap / (frame.search.z + slope); }
+// How much a continuous wall at depth d changes from pixel to pixel at most: less than the interpolated spread (more
+// counts as a jump), and, but for its rim, no more than a steep plane.
+float wall_slope(float d) { return min(frame.search.z, STEEP * d / abs(frame.to_pixel.x)); }
+
+// Pixels a ray at depth d may go before a wall can come near that is `gap` deeper or nearer than it; `slope` is the
+// ray's own change of depth a pixel.
+float clear_pixels(float gap, float slope, float d) { return gap / (wall_slope(d) + slope); }
 
 // What a look along the way to t finds: the secant method finds a wall, not necessarily the first.
 const int CLEAR = 0;    // inside all the way
@@ -163,7 +167,7 @@ int look_until(Ray ray, int cls, Walls walls, float t) {
         if (other_gap < -frame.search.y) return BLOCKED;
         if (abs(wall - before) > frame.search.z * (1.0 + stride)) found = JUMPED;
         before = wall;
-        stride = clamp(clear_pixels(min(gap, other_gap), slope), CHECK_PIXELS, CHECK_STRIDE);
+        stride = clamp(clear_pixels(min(gap, other_gap), slope, d), CHECK_PIXELS, CHECK_STRIDE);
     }
     return found;
 }
@@ -213,7 +217,8 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
         float f = wall > 0.0 ? walls.sense * (d - wall) : HOLE;
         float other = behind > 0.0 ? walls.sense * (behind - d) : HOLE;
         // A pixel's own depth tells which walls are near enough to look closely.
-        bool near = f > -0.5 * frame.search.z, other_near = other > -0.5 * frame.search.z && other < HOLE;
+        float close = 0.5 * wall_slope(d);
+        bool near = f > -close, other_near = other > -close && other < HOLE;
         if (stride > fine && (near || other_near)) {
             stride = fine;
             continue;
@@ -245,7 +250,7 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
             return OUTCOME_HOLE;
         }
         at = way;
-        stride = fine * clamp(clear_pixels(gap, slope) / EXIT_PIXELS, 1.0, EXIT_STRIDE / EXIT_PIXELS);
+        stride = fine * clamp(clear_pixels(gap, slope, d) / EXIT_PIXELS, 1.0, EXIT_STRIDE / EXIT_PIXELS);
     }
     t = last;
     if (at < 1.0) return OUTCOME_NOT_CONVERGED;

@@ -67,6 +67,9 @@
 #define MARCH_STEPS 1024
 #define REFINE_STEPS 24
 
+// Tangent of the steepest surface (81 degrees against the view plane) for which strides are made short.
+#define STEEP 6.0
+
 // One particle: eye-independent, as drawn.
 struct Particle {
     vec4 center;         // xyz: world position
