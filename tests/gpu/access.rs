@@ -205,7 +205,9 @@ fn messages_of_two_fills(driver: &str, barrier: bool) -> Vec<String> {
 fn validation_reports_a_missing_barrier() {
     each_driver(|driver| {
         let found = messages_of_two_fills(&driver.name, false);
-        assert!(found.iter().any(|m| m.contains("SYNC-HAZARD-WRITE-AFTER-WRITE")), "{}: {found:?}", driver.name);
+        // Layers of different years word it "SYNC-HAZARD-WRITE-AFTER-WRITE" and "WRITE_AFTER_WRITE hazard".
+        let hazard = found.iter().any(|m| m.replace('_', "-").contains("WRITE-AFTER-WRITE"));
+        assert!(hazard, "{}: {found:?}", driver.name);
         assert_eq!(messages_of_two_fills(&driver.name, true), Vec::<String>::new(), "{}", driver.name);
     });
 }

@@ -3,7 +3,7 @@
 use crate::{
     camera::{self, View},
     dump,
-    scene::{Scene, Source},
+    scene::{Scene, Source, spinner},
     stats,
 };
 use clap::ValueEnum;
@@ -150,7 +150,9 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     {
         let gpu = Gpu::new(&instance, device)?;
         let mut session = Session::new(&gpu, job.size, &environment)?;
+        let bar = spinner("rendering");
         let done = render(&job, &mut session);
+        bar.finish_and_clear();
         session.end();
         done?;
     }

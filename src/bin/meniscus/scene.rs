@@ -116,7 +116,8 @@ pub fn progress(length: u64, what: &'static str) -> ProgressBar {
     bar
 }
 
-fn spinner(what: &'static str) -> ProgressBar {
+/// A spinner for work whose length is not known, on a terminal.
+pub fn spinner(what: &'static str) -> ProgressBar {
     let bar = ProgressBar::new_spinner().with_message(what);
     bar.enable_steady_tick(Duration::from_secs(1));
     bar
