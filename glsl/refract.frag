@@ -126,11 +126,12 @@ void main() {
         if (outcome != OUTCOME_HIT || volume + 1u == volumes) break;
 
         float t;
-        bool unknown, jumped;
-        int next = find_entry(trace(x, dir), t, unknown, jumped);
+        int found;
+        bool jumped;
+        int next = find_entry(trace(x, dir), t, found, jumped);
         if (jumped && doubt == OUTCOME_HIT) doubt = OUTCOME_PAST_JUMP;
         if (next < 0) {
-            if (unknown) outcome = OUTCOME_LEFT_VIEW;
+            outcome = found;
             break;
         }
         x += t * dir;

@@ -1,6 +1,6 @@
 // The nearest front or farthest back of a class of particles: exact ray cast of each ellipsoid (Sigg06).
 //
-// With the pixel's ray v = vc + delta, a point at depth dc + s is q + s v from the centre, q = dc (delta, 0), and
+// A point of the pixel's ray at depth dc + s is q + s v from the centre, q = dc v - c its offset at the centre's depth, and
 // (q + s v)^T G (q + s v) = 1 is quadratic in s with coefficients of order one.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -22,7 +22,7 @@ vec3 times_g(vec3 a) {
 
 void main() {
     vec3 v = view_ray(gl_FragCoord.xy);
-    vec3 q = vec3(center.z * (v.xy - center.xy), 0.0);
+    vec3 q = vec3(center.z * v.xy - center.xy, 0.0);
     vec3 gv = times_g(v), gq = times_g(q);
     float a = dot(v, gv), b = dot(v, gq), c = dot(q, gq) - 1.0;
     float discriminant = b * b - a * c;

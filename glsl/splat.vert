@@ -8,7 +8,7 @@
 layout(set = 0, binding = 1, std430) readonly buffer ParticleBlock { Particle at[]; } particles;
 layout(set = 0, binding = 2, std430) readonly buffer VisibleBlock { uint at[]; } visible;
 layout(push_constant) uniform PushBlock { Splat splat; };
-layout(location = 0) flat out vec3 center; // vx, vy of the centre's ray and its depth
+layout(location = 0) flat out vec3 center; // eye space, z as depth
 layout(location = 1) flat out vec3 g_diagonal; // G = S^-1 in eye space: xx, yy, zz
 layout(location = 2) flat out vec3 g_mixed;    // xy, xz, yz
 
@@ -26,7 +26,7 @@ void main() {
     Ellipsoid e = to_eye(particles.at[i]);
     vec4 box = pixel_bounds(e);
 
-    center = vec3(e.center.xy / -e.center.z, -e.center.z);
+    center = vec3(e.center.xy, -e.center.z);
     vec3 d = e.sd, m = e.sm;
     vec3 cofactor = vec3(d.y * d.z - m.z * m.z, d.x * d.z - m.y * m.y, d.x * d.y - m.x * m.x);
     vec3 cofactor_mixed = vec3(m.y * m.z - m.x * d.z, m.x * m.z - m.y * d.y, m.x * m.y - m.z * d.x);

@@ -36,7 +36,7 @@ pub struct Particles {
 impl Particles {
     /// How many belong to the body.
     pub fn body_count(&self) -> usize {
-        self.ellipsoids.len() - self.splash_count
+        self.ellipsoids.len().saturating_sub(self.splash_count)
     }
 
     /// World-space box around every ellipsoid: (smallest, largest) corner; `None` without particles.

@@ -84,13 +84,18 @@ struct SceneBounds {
 }
 
 impl Renderer {
-    /// Makes a renderer for outputs of one format: UNORM formats receive sRGB-encoded colour, float formats linear.
+    /// Makes a renderer for outputs of one format: UNORM formats receive colour encoded as
+    /// sRGB, float and `_SRGB` formats linear colour.
     ///
     /// # Safety
     /// * The handles in `host` are alive and stay so until [`Renderer::destroy`] has returned.
     /// * The device was created with [`device::required_features`], and with `largePoints` if `host` says so.
     pub unsafe fn new(host: Host, output: vk::Format) -> Result<Renderer, Error> {
         device::check(&host.instance, host.physical_device, host.queue_family)?;
+        if crate::passes::refract::takes_linear(output).is_none() {
+            let remedy = "use an RGBA float, UNORM or sRGB format";
+            return Err(Error::parameter("output format", format!("{output:?}"), remedy));
+        }
         host.check_attachment(output)?;
         if host.frames_in_flight == 0 {
             return Err(Error::parameter("frames in flight", 0, "use at least 1"));
@@ -125,24 +130,25 @@ impl Renderer {
 
     /// Sets the size of outputs to come, in pixels. Allocates nothing: the next frame does.
     pub fn resize(&mut self, size: [u32; 2]) -> Result<(), Error> {
+        self.check_size(size)?;
+        self.size = size;
+        Ok(())
+    }
+
+    fn check_size(&self, size: [u32; 2]) -> Result<(), Error> {
         let most = self.limits.image_size;
         if size.contains(&0) || size.iter().any(|s| *s > most) {
             let what = format!("{}x{}", size[0], size[1]);
             return Err(Error::parameter("size", what, format!("use 1 to {most} pixels each way on this device")));
         }
-        let bounds = 8 * u64::from(size[0]) * u64::from(size[1]);
-        if bounds > self.limits.storage_size {
-            let what = format!("{}x{}", size[0], size[1]);
-            return Err(Error::parameter("size", what, "its depth bounds do not fit a storage buffer of this device"));
-        }
-        self.size = size;
         Ok(())
     }
 
     /// Device memory that frames take, resource by resource, before anything is allocated. The particle buffer is
     /// extra: 48 bytes a particle; a static environment map 16 bytes a texel.
-    pub fn memory_requirements(&self, needs: &Needs) -> Vec<LedgerEntry> {
-        targets::ledger(&self.host.device, needs)
+    pub fn memory_requirements(&self, needs: &Needs) -> Result<Vec<LedgerEntry>, Error> {
+        self.check_size(needs.size)?;
+        Ok(targets::ledger(&self.host.device, needs))
     }
 
     /// Device memory in use now, resource by resource.
@@ -155,7 +161,10 @@ impl Renderer {
 
     /// What the next frame with these settings needs.
     pub fn needs(&self, settings: &Settings, debug: bool) -> Needs {
-        Needs::new(self.size, self.scene.splash, self.scene.body, settings, debug)
+        let mut needs = Needs::new(self.size, self.scene.splash, self.scene.body, settings, debug);
+        // Culling only saves time: where its bounds do not fit a storage buffer, everything is drawn.
+        needs.occlusion &= 8 * u64::from(self.size[0]) * u64::from(self.size[1]) <= self.limits.storage_size;
+        needs
     }
 
     /// Gives the particles of the frames to come. The host's memory is copied; the last particles are kept until the
@@ -166,21 +175,36 @@ impl Renderer {
         if !(particles.radius.is_finite() && particles.radius > 0.0) {
             return Err(Error::parameter("particle radius", particles.radius, "use a finite length above 0"));
         }
-        if bytes > self.limits.storage_size || count > i32::MAX as usize {
-            let remedy = format!(
-                "this device holds {} at most",
-                self.limits.storage_size / size_of::<shader::Particle>() as u64
-            );
-            return Err(Error::parameter("particles", count, remedy));
+        if particles.splash_count > count {
+            return Err(Error::parameter(
+                "splash count",
+                particles.splash_count,
+                format!("there are {count} particles"),
+            ));
         }
-        if let Some(bad) = particles.ellipsoids.iter().position(|e| !(e.center.is_finite() && e.axes.is_finite())) {
-            return Err(Error::parameter("particles", format!("not finite at {bad}"), "centres and axes are finite"));
+        let most = self.limits.storage_size / size_of::<shader::Particle>() as u64;
+        let most = most.min(u64::from(self.limits.groups) * u64::from(shader::PARTICLE_GROUP));
+        if count as u64 > most {
+            return Err(Error::parameter("particles", count, format!("this device holds {most} at most")));
         }
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
         let mut buffer = Buffer::new(&self.host, Id::Particles.name(), bytes, usage, MemoryLocation::CpuToGpu)?;
         let inverse = 1.0 / particles.radius;
-        for (out, e) in buffer.mapped().chunks_exact_mut(size_of::<shader::Particle>()).zip(&particles.ellipsoids) {
-            out.copy_from_slice(bytemuck::bytes_of(&pack(e.center, e.axes * inverse)));
+        let mut bad = None;
+        for (i, e) in particles.ellipsoids.iter().enumerate() {
+            let packed = pack(e.center, e.axes * inverse);
+            let sound =
+                packed.center.is_finite() && packed.shape_diagonal.is_finite() && packed.shape_mixed.is_finite();
+            if !sound && bad.is_none() {
+                bad = Some(i);
+            }
+            let at = i * size_of::<shader::Particle>();
+            buffer.mapped()[at..at + size_of::<shader::Particle>()].copy_from_slice(bytemuck::bytes_of(&packed));
+        }
+        if let Some(i) = bad {
+            buffer.destroy(&self.host);
+            let remedy = "centres and semi-axes over the radius have to be finite, squared too";
+            return Err(Error::parameter("particles", format!("number {i} is out of range"), remedy));
         }
         if let Some(old) = self.particles.replace(buffer) {
             self.retire(Doomed::Buffer(old));
@@ -271,7 +295,7 @@ impl Renderer {
         self.retired.push(self.frame + 1, doomed);
     }
 
-    /// Records one frame into the host's command buffer.
+    /// Records one frame into the host's command buffer. After an error the command buffer is not to be submitted.
     ///
     /// # Safety
     /// * `cmd` is recording, outside rendering, and goes to a queue of the family in [`Host`], after all frames
@@ -290,16 +314,15 @@ impl Renderer {
                 "no environment yet: call Renderer::set_environment first (Equirect::procedural_sky needs no file)",
             ));
         };
+        let needs = self.needs(input.settings, input.debug);
         let Some(slot) = self.slots.get_mut(input.slot) else {
             return Err(Error::parameter("slot", input.slot, "use less than Host::frames_in_flight"));
         };
         // The slot's last frame has completed, and with it every frame before.
         self.retired.collect(&self.host, slot.frame);
-        let needs = Needs::new(self.size, self.scene.splash, self.scene.body, input.settings, input.debug);
         self.frame += 1;
         self.table.fit(&self.host, &needs, &mut self.retired, self.frame)?;
         self.table.discard_contents();
-        slot.frame = self.frame;
 
         let mut block = input.camera.uniforms(input.settings, self.size, self.scene.radius, self.scene.bounds);
         block.particles.x = needs.splash;
@@ -339,7 +362,13 @@ impl Renderer {
             plan: &mut self.plan,
             size: self.size,
         };
-        frame::record(&mut recorder, &mut self.passes, &needs, input.settings)
+        let recorded = frame::record(&mut recorder, &mut self.passes, &needs, input.settings);
+        match &recorded {
+            Ok(()) => slot.frame = self.frame,
+            // The barriers recorded so far will never run: start again from new resources.
+            Err(_) => self.table.retire_all(&mut self.retired, self.frame + 1),
+        }
+        recorded
     }
 
     /// The barriers of the last recorded frame, in order; printable.
@@ -347,7 +376,8 @@ impl Renderer {
         &self.plan
     }
 
-    /// GPU times of the frame last recorded into a slot; `None` until it has completed, or without timestamps.
+    /// GPU times of the frame last recorded into a slot, which has completed; `None` before the first, or without
+    /// timestamps. Does not wait.
     pub fn times(&self, slot: usize) -> Option<FrameTimes> {
         self.slots.get(slot)?.profiler.as_ref()?.read(&self.host.device)
     }

@@ -149,7 +149,7 @@ impl Camera {
         if !(self.near > 0.0 && self.near.is_finite()) {
             return Err(Error::parameter("near plane", self.near, "use a finite distance above 0"));
         }
-        if !(self.up.is_finite() && self.up.length() > 0.0) {
+        if !(self.up.length().is_finite() && self.up.length() > 0.0) {
             return Err(Error::parameter("up", self.up, "use a finite direction that is not zero"));
         }
         Ok(())

@@ -9,7 +9,8 @@ vec3 env_texel(ivec2 p, ivec2 size) {
 vec3 env_color(vec3 dir) {
     vec3 w = mat3(frame.eye_to_env) * dir;
     ivec2 size = textureSize(environment, 0);
-    vec2 uv = vec2(atan(w.z, w.x) * 0.15915494309 + 0.5, acos(clamp(w.y, -1.0, 1.0)) * 0.31830988618);
+    float around = w.x == 0.0 && w.z == 0.0 ? 0.0 : atan(w.z, w.x); // undefined straight up and down
+    vec2 uv = vec2(around * 0.15915494309 + 0.5, acos(clamp(w.y, -1.0, 1.0)) * 0.31830988618);
     vec2 q = uv * vec2(size) - 0.5, b = floor(q), f = q - b;
     ivec2 p = ivec2(b);
     return mix(mix(env_texel(p, size), env_texel(p + ivec2(1, 0), size), f.x),

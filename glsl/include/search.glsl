@@ -276,9 +276,9 @@ bool crosses_front(Ray ray, int cls, float middle, float step, out float t, inou
     return false;
 }
 
-// The nearest front surface of either class that a ray outside meets, or -1. Sets `unknown` where the ray left the
-// view, or ran out of steps, before it left the liquid's box, and `jumped` where it passed behind a surface unseen.
-int find_entry(Ray ray, out float t, out bool unknown, out bool jumped) {
+// The nearest front surface of either class that a ray outside meets, or -1. The outcome says where
+// the ray left the view, or ran out of steps, before it left the liquid's box. Sets `jumped` where it passed behind a surface unseen.
+int find_entry(Ray ray, out float t, out int outcome, out bool jumped) {
     jumped = false;
     float share = min(ENTRY_PIXELS / max(ray.span, 1e-6), 1.0);
     float slack = frame.search.z;
@@ -311,13 +311,13 @@ int find_entry(Ray ray, out float t, out bool unknown, out bool jumped) {
             if (splash || body) {
                 bool first = splash && (!body || t_splash <= t_body);
                 t = first ? t_splash : t_body;
-                unknown = false;
+                outcome = OUTCOME_HIT;
                 return first ? CLASS_SPLASH : CLASS_BODY;
             }
         }
         at += share;
     }
     t = 0.0;
-    unknown = ray.leaves || at - 0.5 * share < 1.0;
+    outcome = at - 0.5 * share < 1.0 ? OUTCOME_NOT_CONVERGED : (ray.leaves ? OUTCOME_LEFT_VIEW : OUTCOME_HIT);
     return -1;
 }

@@ -1,4 +1,4 @@
-//! A small Vulkan host: what the command line, the tests and the examples need to call the library as any engine
+//! A small Vulkan host: what the command line and the tests need to call the library as any engine
 //! would. An engine has all of this already; only the feature `host` compiles it.
 
 mod canvas;

@@ -42,6 +42,14 @@ pub enum ImageError {
         /// Reason.
         source: image::ImageError,
     },
+    /// The folder to write into is not there.
+    #[error("{}: there is no folder {}; create it", file.display(), folder.display())]
+    Folder {
+        /// File to be written.
+        file: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+    },
     /// An extension nothing is written for.
     #[error("{}: the picture can be .png (sRGB, 8 bits) or .exr (linear, float)", .0.display())]
     Extension(PathBuf),
@@ -55,6 +63,11 @@ pub fn read_environment(path: &Path) -> Result<Equirect, ImageError> {
     let srgb = reader.format() == Some(ImageFormat::Png);
     let image = reader.decode().map_err(decode)?.into_rgb32f();
     let (width, height) = image.dimensions();
+    if width.abs_diff(2 * height) > height / 4 {
+        let what = format!("{width}x{height}");
+        let source = Error::parameter("environment map", what, "an equirectangular map is twice as wide as it is high");
+        return Err(ImageError::Content { path: path.into(), source });
+    }
     let curve = |v: f32| if srgb { decode_srgb(v) } else { v };
     let rgb: Vec<[f32; 3]> = image.pixels().map(|p| p.0.map(curve)).collect();
     Equirect::new(width, height, &rgb).map_err(|source| ImageError::Content { path: path.into(), source })
@@ -66,6 +79,16 @@ pub fn check_extension(path: &Path) -> Result<(), ImageError> {
         Some("png" | "exr") => Ok(()),
         _ => Err(ImageError::Extension(path.into())),
     }
+}
+
+/// Checks early that the folder a file goes into is there.
+pub fn check_folder(path: &Path) -> Result<(), ImageError> {
+    let folder = parent(path);
+    if folder.is_dir() { Ok(()) } else { Err(ImageError::Folder { file: path.into(), folder: folder.into() }) }
+}
+
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 fn extension(path: &Path) -> Option<String> {
@@ -94,8 +117,7 @@ pub fn write_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<()
 /// Writes a file under a temporary name beside it, then renames it.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     let io = |source| ImageError::Io { path: path.into(), source };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
+    let mut file = tempfile::NamedTempFile::new_in(parent(path)).map_err(io)?;
     let mut out = BufWriter::new(file.as_file_mut());
     out.write_all(bytes).and_then(|()| out.flush()).map_err(io)?;
     drop(out);

@@ -19,10 +19,17 @@ pub(crate) struct Refract {
     output: vk::Format,
 }
 
-/// Formats into which light is written as it is; all others take it encoded as sRGB.
-fn is_linear(format: vk::Format) -> bool {
+/// Whether a format takes light as it is (float, or sRGB, which the hardware encodes) or encoded by the shader (UNORM);
+/// `None` for formats that cannot hold a picture.
+pub(crate) fn takes_linear(format: vk::Format) -> Option<bool> {
     use vk::Format as F;
-    matches!(format, F::R32G32B32A32_SFLOAT | F::R16G16B16A16_SFLOAT | F::B10G11R11_UFLOAT_PACK32)
+    match format {
+        F::R32G32B32A32_SFLOAT | F::R16G16B16A16_SFLOAT | F::B10G11R11_UFLOAT_PACK32 => Some(true),
+        F::R8G8B8A8_SRGB | F::B8G8R8A8_SRGB | F::A8B8G8R8_SRGB_PACK32 => Some(true),
+        F::R8G8B8A8_UNORM | F::B8G8R8A8_UNORM | F::A8B8G8R8_UNORM_PACK32 => Some(false),
+        F::A2B10G10R10_UNORM_PACK32 | F::A2R10G10B10_UNORM_PACK32 | F::R16G16B16A16_UNORM => Some(false),
+        _ => None,
+    }
 }
 
 impl Refract {
@@ -64,7 +71,7 @@ impl Refract {
             u32::from(splash),
             u32::from(body),
             u32::from(has_scene),
-            u32::from(!is_linear(self.output)),
+            u32::from(takes_linear(self.output) == Some(false)),
         ];
         let host = r.host;
         let pipeline = self.pipelines.get((constants, needs.debug), |(constants, debug)| {

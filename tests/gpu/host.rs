@@ -106,7 +106,7 @@ fn memory_is_known_before_it_is_allocated() {
         with_renderer(driver, vk::Format::R32G32B32A32_SFLOAT, 1, |gpu, renderer| {
             let case = case(random_cloud(5, 0.1, Vec3::splat(-0.6), Vec3::splat(0.6), 5, 60));
             let needs = Needs::new(SIZE, 5, 60, &case.settings, false);
-            let asked = renderer.memory_requirements(&needs);
+            let asked = renderer.memory_requirements(&needs).expect("a valid size");
             renderer.set_particles(&case.particles).expect("particles");
             let canvas = Canvas::new(gpu, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE).expect("canvas");
             gpu.run(|cmd| {
@@ -233,8 +233,8 @@ fn what_the_caller_gets_wrong_is_said() {
             flat.camera.near = 0.0;
             assert!(refused(&input(&flat, 0, canvas.view)).contains("near plane"));
             // SAFETY: a new renderer on the same device; refused or destroyed at once.
-            let other = unsafe { Renderer::new(gpu.host(1), vk::Format::BC1_RGB_UNORM_BLOCK) };
-            assert!(other.err().expect("no colour attachment").to_string().contains("BC1_RGB_UNORM_BLOCK"));
+            let other = unsafe { Renderer::new(gpu.host(1), vk::Format::R32G32_UINT) };
+            assert!(other.err().expect("no colour attachment").to_string().contains("R32G32_UINT"));
         });
     });
 }

@@ -348,3 +348,23 @@ fn a_frame_does_without_what_it_does_not_need() {
         }
     });
 }
+
+/// A centre exactly in the eye's own plane has no ray of its own; the ball around the eye is seen from within all the same.
+#[test]
+fn a_centre_in_the_eye_plane_does_not_vanish() {
+    let size = [64, 48];
+    let ball =
+        meniscus::Particles { radius: 1.0, ellipsoids: vec![crate::support::sphere(Vec3::ZERO, 1.0)], splash_count: 1 };
+    let eye = Vec3::new(0.5, 0.0, 0.0);
+    let case = Case {
+        particles: ball,
+        camera: camera(eye, eye - Vec3::Z, size),
+        settings: Settings::default(),
+        size,
+        eye_inside: false,
+    };
+    each_driver(|driver| {
+        let back = driver.shoot(&case).floats(Id::SplashDepth, 1).expect("a splash");
+        assert!(back.iter().all(|d| *d > 0.0 && *d < 1.5), "{}", driver.name);
+    });
+}

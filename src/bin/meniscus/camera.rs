@@ -23,11 +23,10 @@ pub fn frame(
     if !(view.fov_y_deg > 0.0 && view.fov_y_deg < 170.0) {
         return Err(wrong("fov-y", view.fov_y_deg.to_string(), "use degrees above 0 and below 170"));
     }
-    let up = view.up.as_vec3();
-    if !(up.is_finite() && up.length() > 0.0) {
+    let up = view.up.normalize().as_vec3();
+    if !up.is_finite() {
         return Err(wrong("up", view.up.to_string(), "use a finite direction that is not zero"));
     }
-    let up = up.normalize();
     let fov = view.fov_y_deg.to_radians();
     let local = |p: DVec3| (p - origin).as_vec3();
     let (fit_eye, fit_target) = fit(up, fov, aspect, particles);

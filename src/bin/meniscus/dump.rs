@@ -14,10 +14,20 @@ use npyz::WriterBuilder;
 use serde_json::json;
 use std::{collections::BTreeMap, error::Error, path::Path};
 
+/// How the names of targets begin.
+const TARGETS: [&str; 4] = ["splash_front_", "splash_back_", "body_front_", "body_back_"];
+
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    // Targets of an earlier frame that this one does without would not belong to this frame.json.
+    for entry in std::fs::read_dir(folder)?.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if TARGETS.iter().any(|t| name.starts_with(t)) && name.ends_with(".npy") {
+            std::fs::remove_file(entry.path())?;
+        }
+    }
     let out = Folder { path: folder, size: job.size };
     let needs = session.renderer.needs(&job.settings, true);
     let smooth = (needs.body_depth(), needs.body_normal());

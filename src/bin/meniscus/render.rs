@@ -9,11 +9,11 @@ use crate::{
 use clap::ValueEnum;
 use glam::{DVec3, Vec3};
 use meniscus::{
-    Camera, Equirect, FrameInput, Fresnel, Settings, Weighting,
+    Camera, Equirect, Error, FrameInput, Fresnel, Settings, Weighting,
     host::{Gpu, Instance, Session},
     io::images,
 };
-use std::{error::Error, path::PathBuf, process::ExitCode};
+use std::{path::PathBuf, process::ExitCode};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -134,8 +134,11 @@ pub struct Job<'a> {
     pub eye_inside: bool,
 }
 
-pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
+pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     images::check_extension(&args.output)?;
+    for path in [Some(&args.output), args.stats.as_ref()].into_iter().flatten() {
+        images::check_folder(path)?;
+    }
     let environment = args.env.as_deref().map_or_else(|| Ok(Equirect::procedural_sky()), images::read_environment)?;
     let instance = Instance::new(args.validate)?;
     let device = instance.pick(args.device.as_deref())?;
@@ -177,7 +180,7 @@ fn announce(scene: &Scene, device: &str, driver: &str) {
     }
 }
 
-fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn Error>> {
+fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::error::Error>> {
     let radius = scene.particles.radius;
     let (low, high) = scene.particles.bounds().unwrap_or((Vec3::splat(-1.0), Vec3::splat(1.0)));
     let aspect = args.size[0].max(1) as f32 / args.size[1].max(1) as f32;
@@ -185,6 +188,11 @@ fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn Error>>
     let (camera, eye) = camera::frame(&view, scene.origin, &scene.particles, aspect, 0.1 * radius)?;
     let s = args.supersample;
     let times = |edge: u32| edge.checked_mul(s).ok_or("the size times the supersampling is too large");
+    let widest = (Settings::MAX_WINDOW - 1) / s + 1;
+    if args.window.is_multiple_of(2) || !(3..=widest).contains(&args.window) {
+        let remedy = format!("at --supersample {s} use an odd number of pixels from 3 to {}", (widest - 1) / 2 * 2 + 1);
+        return Err(Error::Parameter { parameter: "window", value: args.window.to_string(), remedy }.into());
+    }
     let settings = Settings {
         refractions: args.refractions,
         internal_reflections: args.internal_reflections,
@@ -195,7 +203,7 @@ fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn Error>>
         ior: args.ior,
         absorption: args.absorption.map_or(Vec3::new(1.0, 0.35, 0.2) * (1.2 / (high - low).length()), |a| a.as_vec3()),
         // The window covers the same part of the picture at any supersampling.
-        window: args.window.saturating_sub(1).saturating_mul(s) + 1,
+        window: (args.window - 1) * s + 1,
         iterations: args.iterations,
         sigma: args.sigma,
         weighting: match args.weighting {
@@ -210,7 +218,7 @@ fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn Error>>
     Ok(Job { args, scene, camera, eye, settings, size, eye_inside: scene.inside(eye) })
 }
 
-fn render(job: &Job, session: &mut Session) -> Result<(), Box<dyn Error>> {
+fn render(job: &Job, session: &mut Session) -> Result<(), Box<dyn std::error::Error>> {
     session.renderer.set_particles(&job.scene.particles)?;
     let mut input = FrameInput {
         slot: 0,

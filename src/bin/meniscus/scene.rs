@@ -66,6 +66,10 @@ impl Scene {
                 }
             },
         };
+        let reach = positions.iter().fold(radius.abs(), |m, p| m.max(f64::from(p.abs().max_element())));
+        if reach.is_nan() || reach >= 1e15 {
+            return Err(format!("coordinates or radius reach {reach:e}: scale the scene to below 1e15").into());
+        }
         let classes: Option<Vec<Class>> = file
             .classes
             .as_ref()
@@ -108,7 +112,7 @@ fn origin(positions: &[DVec3]) -> DVec3 {
     if middle.length() > 16.0 * (high - low).length() { middle.round() } else { DVec3::ZERO }
 }
 
-/// A bar that shows itself after a second, on a terminal.
+/// A bar for work that may take longer than a second; shown on terminals only.
 pub fn progress(length: u64, what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} {eta}").expect("a constant template");
     let bar = ProgressBar::new(length).with_style(style).with_message(what);
