@@ -68,7 +68,8 @@ void main() {
     const uint volumes = REFRACTIONS == 1 ? 1u : REFRACTIONS / 2u;
     for (uint volume = 0u; volume < volumes && outcome == OUTCOME_HIT; ++volume) {
         if (entering) {
-            vec3 n = volume == 0u ? map_normal(cls, SIDE_FRONT, pixel) : sample_normal(cls, SIDE_FRONT, project(x));
+            bool smooth_here;
+            vec3 n = volume == 0u ? map_normal(cls, SIDE_FRONT, pixel) : sample_normal(cls, SIDE_FRONT, project(x), smooth_here);
             if (dot(dir, n) > 0.0) {
                 n = -n;
                 flipped += 1.0;
@@ -101,9 +102,8 @@ void main() {
             if (outcome != OUTCOME_HIT) break;
             hits += 1.0;
             bool smooth_here;
-            sample_depth(cls, side, project(x), smooth_here);
+            vec3 n = sample_normal(cls, side, project(x), smooth_here);
             if (!smooth_here && doubt == OUTCOME_HIT) doubt = OUTCOME_PAST_JUMP;
-            vec3 n = sample_normal(cls, side, project(x));
             if (dot(dir, n) < 0.0) {
                 n = -n;
                 flipped += 1.0;

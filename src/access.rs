@@ -82,6 +82,23 @@ pub struct Barrier {
     pub dst: (S, A, L),
 }
 
+impl Barrier {
+    /// The barrier for every subresource of an image.
+    pub(crate) fn on_image(&self, image: vk::Image, aspect: vk::ImageAspectFlags) -> vk::ImageMemoryBarrier2<'static> {
+        vk::ImageMemoryBarrier2::default()
+            .src_stage_mask(self.src.0)
+            .src_access_mask(self.src.1)
+            .old_layout(self.src.2)
+            .dst_stage_mask(self.dst.0)
+            .dst_access_mask(self.dst.1)
+            .new_layout(self.dst.2)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .image(image)
+            .subresource_range(whole(aspect))
+    }
+}
+
 impl State {
     /// The content no longer matters: the next use may start from an undefined layout. Execution order is kept.
     pub fn discard(&mut self) {

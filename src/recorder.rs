@@ -2,11 +2,11 @@
 
 use crate::{
     Error,
-    access::{Access, Barrier, State, whole},
+    access::{Access, Barrier, State},
     device::Host,
     pipeline::Pipeline,
     profile::Profiler,
-    resources::{Buffer, Doomed, Image, Retired},
+    resources::{Buffer, Image, Resource, Retired},
     shader::Kind,
     targets::{Id, Needs, Spec},
 };
@@ -32,11 +32,6 @@ pub(crate) const fn used(id: Id, access: Access) -> Use {
     Use { id, access, binding: None }
 }
 
-pub(crate) enum Resource {
-    Image(Image),
-    Buffer(Buffer),
-}
-
 struct Entry {
     resource: Resource,
     spec: Spec,
@@ -56,7 +51,7 @@ impl Table {
                 continue;
             }
             if let Some(old) = self.0.remove(&id) {
-                retired.push(frame, doom(old.resource));
+                retired.push(frame, old.resource);
             }
             let Some(spec) = spec else { continue };
             let resource = match &spec {
@@ -97,15 +92,8 @@ impl Table {
 
     pub fn retire_all(&mut self, retired: &mut Retired, frame: u64) {
         for (_, e) in std::mem::take(&mut self.0) {
-            retired.push(frame, doom(e.resource));
+            retired.push(frame, e.resource);
         }
-    }
-}
-
-fn doom(resource: Resource) -> Doomed {
-    match resource {
-        Resource::Image(i) => Doomed::Image(i),
-        Resource::Buffer(b) => Doomed::Buffer(b),
     }
 }
 
@@ -189,19 +177,7 @@ impl Recorder<'_> {
             self.plan.push(PlanEntry { pass, resource: u.id.name(), barrier });
             let (src, dst) = (barrier.src, barrier.dst);
             match &entry.resource {
-                Resource::Image(image) => images.push(
-                    vk::ImageMemoryBarrier2::default()
-                        .src_stage_mask(src.0)
-                        .src_access_mask(src.1)
-                        .old_layout(src.2)
-                        .dst_stage_mask(dst.0)
-                        .dst_access_mask(dst.1)
-                        .new_layout(dst.2)
-                        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                        .image(image.handle)
-                        .subresource_range(whole(image.aspect)),
-                ),
+                Resource::Image(image) => images.push(barrier.on_image(image.handle, image.aspect)),
                 Resource::Buffer(buffer) => buffers.push(
                     vk::BufferMemoryBarrier2::default()
                         .src_stage_mask(src.0)

@@ -8,8 +8,8 @@ use crate::{
     particles::Particles,
     passes::Passes,
     profile::FrameTimes,
-    recorder::{Externals, PlanEntry, Recorder, Resource, Table, used},
-    resources::{Buffer, Doomed, Image, ImageSpec, Retired},
+    recorder::{Externals, PlanEntry, Recorder, Table, used},
+    resources::{Buffer, Image, ImageSpec, Resource, Retired},
     settings::{Camera, Settings},
     shader,
     slot::Slot,
@@ -102,7 +102,7 @@ impl Renderer {
         }
         let limits = host.limits();
         let mut renderer = Renderer {
-            passes: Passes::new(&host, &limits, output),
+            passes: Passes::new(&limits, output),
             host,
             limits,
             size: [0, 0],
@@ -207,7 +207,7 @@ impl Renderer {
             return Err(Error::parameter("particles", format!("number {i} is out of range"), remedy));
         }
         if let Some(old) = self.particles.replace(buffer) {
-            self.retire(Doomed::Buffer(old));
+            self.retire(Resource::Buffer(old));
         }
         let bounds = particles.bounds().unwrap_or_default();
         self.scene = SceneBounds {
@@ -255,17 +255,7 @@ impl Renderer {
         let mut state = access::State::default();
         for access in [access::Access::TransferWrite, access::Access::FragmentRead] {
             if let Some(b) = state.step(access, true) {
-                let barrier = vk::ImageMemoryBarrier2::default()
-                    .src_stage_mask(b.src.0)
-                    .src_access_mask(b.src.1)
-                    .old_layout(b.src.2)
-                    .dst_stage_mask(b.dst.0)
-                    .dst_access_mask(b.dst.1)
-                    .new_layout(b.dst.2)
-                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                    .image(image.handle)
-                    .subresource_range(access::whole(image.aspect));
+                let barrier = b.on_image(image.handle, image.aspect);
                 let info = vk::DependencyInfo::default().image_memory_barriers(std::slice::from_ref(&barrier));
                 // SAFETY: `cmd` is recording (this function's contract); the image is new.
                 unsafe { self.host.device.cmd_pipeline_barrier2(cmd, &info) };
@@ -282,17 +272,17 @@ impl Renderer {
                 };
             }
         }
-        self.retire(Doomed::Buffer(staging));
+        self.retire(Resource::Buffer(staging));
         if let Some(old) = self.environment.replace(image) {
-            self.retire(Doomed::Image(old));
+            self.retire(Resource::Image(old));
         }
         Ok(())
     }
 
     /// Keeps something that recorded commands may still use until the next frame has completed: uploads and copies
     /// that were recorded since the last frame run before that one.
-    fn retire(&mut self, doomed: Doomed) {
-        self.retired.push(self.frame + 1, doomed);
+    fn retire(&mut self, resource: Resource) {
+        self.retired.push(self.frame + 1, resource);
     }
 
     /// Records one frame into the host's command buffer. After an error the command buffer is not to be submitted.

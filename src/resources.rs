@@ -201,36 +201,36 @@ impl Buffer {
     }
 }
 
-/// Something that frames in flight may still use.
-pub(crate) enum Doomed {
+/// An image or a buffer.
+pub(crate) enum Resource {
     Image(Image),
     Buffer(Buffer),
 }
 
-impl Doomed {
+impl Resource {
     fn destroy(&mut self, host: &Host) {
         match self {
-            Doomed::Image(i) => i.destroy(host),
-            Doomed::Buffer(b) => b.destroy(host),
+            Resource::Image(i) => i.destroy(host),
+            Resource::Buffer(b) => b.destroy(host),
         }
     }
 }
 
 /// Replaced resources, each with the number of the last frame that may use it.
 #[derive(Default)]
-pub(crate) struct Retired(Vec<(u64, Doomed)>);
+pub(crate) struct Retired(Vec<(u64, Resource)>);
 
 impl Retired {
-    pub fn push(&mut self, last_frame: u64, doomed: Doomed) {
-        self.0.push((last_frame, doomed));
+    pub fn push(&mut self, last_frame: u64, resource: Resource) {
+        self.0.push((last_frame, resource));
     }
 
     /// Destroys what only completed frames used: every frame up to and including `completed`.
     pub fn collect(&mut self, host: &Host, completed: u64) {
-        self.0.retain_mut(|(last, doomed)| {
+        self.0.retain_mut(|(last, resource)| {
             let keep = *last > completed;
             if !keep {
-                doomed.destroy(host);
+                resource.destroy(host);
             }
             keep
         });

@@ -41,8 +41,7 @@ float sample_depth(int cls, int side, vec2 pixel, out bool smooth_here) {
     return low + mix(mix(d.x, d.y, p.f.x), mix(d.z, d.w, p.f.x), p.f.y);
 }
 
-vec3 sample_normal(int cls, int side, vec2 pixel) {
-    bool smooth_here;
+vec3 sample_normal(int cls, int side, vec2 pixel, out bool smooth_here) {
     sample_depth(cls, side, pixel, smooth_here);
     if (!smooth_here) return map_normal(cls, side, nearest(pixel));
     Footprint p = footprint(pixel);

@@ -1,6 +1,7 @@
 //! A colour image of the host's.
 
 use super::{Gpu, HostError, vulkan};
+use crate::access::Barrier;
 use ash::vk;
 use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
@@ -52,17 +53,8 @@ impl<'a> Canvas<'a> {
     pub fn transition(&self, cmd: vk::CommandBuffer, from: vk::ImageLayout, to: vk::ImageLayout) {
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
         let memory = vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE;
-        let barrier = [vk::ImageMemoryBarrier2::default()
-            .src_stage_mask(all)
-            .src_access_mask(memory)
-            .old_layout(from)
-            .dst_stage_mask(all)
-            .dst_access_mask(memory)
-            .new_layout(to)
-            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .image(self.image)
-            .subresource_range(crate::access::whole(vk::ImageAspectFlags::COLOR))];
+        let barrier = Barrier { src: (all, memory, from), dst: (all, memory, to) };
+        let barrier = [barrier.on_image(self.image, vk::ImageAspectFlags::COLOR)];
         // SAFETY: `cmd` is recording outside rendering; the image is alive and in the layout `from`.
         unsafe {
             self.gpu.device.cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default().image_memory_barriers(&barrier))

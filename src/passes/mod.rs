@@ -33,7 +33,7 @@ pub(crate) struct Passes {
 }
 
 impl Passes {
-    pub fn new(host: &Host, limits: &Limits, output: vk::Format) -> Passes {
+    pub fn new(limits: &Limits, output: vk::Format) -> Passes {
         Passes {
             reset: reset::Reset,
             occlude: occlude::Occlude::default(),
@@ -42,7 +42,7 @@ impl Passes {
             plane_fit: plane_fit::PlaneFit::default(),
             normals: normals::Normals::default(),
             tiles: tiles::Tiles::default(),
-            refract: refract::Refract::new(host, output),
+            refract: refract::Refract::new(output),
         }
     }
 

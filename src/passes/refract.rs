@@ -4,7 +4,6 @@ use super::Pipelines;
 use crate::{
     Error,
     access::Access,
-    device::Host,
     pipeline::{Graphics, Pipeline},
     recorder::{Recorder, bound, used},
     settings::{Fresnel, Settings},
@@ -33,7 +32,7 @@ pub(crate) fn takes_linear(format: vk::Format) -> Option<bool> {
 }
 
 impl Refract {
-    pub fn new(_host: &Host, output: vk::Format) -> Refract {
+    pub fn new(output: vk::Format) -> Refract {
         Refract { pipelines: Pipelines::default(), output }
     }
 
