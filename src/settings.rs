@@ -171,6 +171,12 @@ impl Camera {
         let farthest = self.view.transform_point3(0.5 * (low + high)).length() + 0.5 * (high - low).length();
         // A thousandth of a radius finds a root; a float's steps at the farthest depth are the floor below it.
         let converged = (1e-3 * radius).max(1e-6 * farthest);
+        // What a pixel covers at the liquid: where particles are hardly larger, their own size says nothing of what a
+        // map can tell apart.
+        let middle = self.view.transform_point3(0.5 * (low + high)).length();
+        let pixel = middle / to_pixel.x.abs().max(to_pixel.y.abs());
+        let accepted = (Self::ACCEPTED * radius).max(Self::ACCEPTED_PIXELS * pixel).max(converged);
+        let jump = (Self::JUMP * radius).max(Self::JUMP_PIXELS * pixel);
         let to_up = Mat3::from_quat(glam::Quat::from_rotation_arc(self.up.normalize(), Vec3::Y));
         Frame {
             view: self.view,
@@ -183,7 +189,7 @@ impl Camera {
                 crate::shader::FIT_GRAZING_LIMIT,
                 0.0,
             ),
-            search: Vec4::new(converged, converged.max(Self::ACCEPTED * radius), Self::JUMP * radius, settings.ior),
+            search: Vec4::new(converged, accepted, jump, settings.ior),
             absorption: settings.absorption.extend(0.0),
             bounds_min: low.extend(0.0),
             bounds_max: high.extend(0.0),
@@ -192,8 +198,12 @@ impl Camera {
         }
     }
 
-    /// Largest |f| of an accepted hit, in particle radii.
+    /// Largest |f| of an accepted hit, in particle radii, or
     pub const ACCEPTED: f32 = 0.05;
-    /// Largest spread of the depths around a sample that is still interpolated, in particle radii.
+    /// in what a pixel covers in the middle of the liquid, whichever is more.
+    pub const ACCEPTED_PIXELS: f32 = 0.1;
+    /// Largest spread of the depths around a sample that is still interpolated, in particle radii, or
     pub const JUMP: f32 = 2.0;
+    /// in what a pixel covers in the middle of the liquid, whichever is more: a surface 80 degrees steep.
+    pub const JUMP_PIXELS: f32 = crate::shader::STEEP;
 }

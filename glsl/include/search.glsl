@@ -256,57 +256,80 @@ int find_exit(Ray ray, int cls, int came_from, out float t, out int side) {
     return ray.leaves ? OUTCOME_LEFT_VIEW : OUTCOME_HOLE;
 }
 
-// The first crossing of a class's front map, from in front to behind and without a jump, within half a step of `middle`
-// (shares of the ray's way across the screen): looked for at quarters of the step, then refined. Sets `jumped` where
-// the ray passes behind a surface without crossing it.
-bool crosses_front(Ray ray, int cls, float middle, float step, out float t, inout bool jumped) {
+// The share of the way at which a line leaves a square of pixels; after `least`, and 1 at most.
+float leaves_cell(vec2 p0, vec2 way, ivec2 corner, int size, float least) {
+    vec2 edge = vec2(corner) + float(size) * vec2(greaterThan(way, vec2(0.0)));
+    vec2 share = mix((edge - p0) / way, vec2(1.0), lessThan(abs(way), vec2(1e-6)));
+    return clamp(min(share.x, share.y), min(least, 1.0), 1.0);
+}
+
+// The first crossing of a class's front map, from in front to behind and without a jump, between two shares of the ray's
+// way across the screen: looked for at even steps, then refined. Sets `jumped` where the ray passes behind a surface
+// without crossing it.
+bool crosses_front(Ray ray, int cls, float from, float to, out float t, inout bool jumped) {
     float a = 0.0, fa = HOLE;
     t = 0.0;
-    for (int k = -2; k <= 2; ++k) {
-        float b = pixel_to_t(ray, clamp(middle + 0.25 * float(k) * step, 0.0, 1.0));
+    int steps = clamp(int(ceil((to - from) * ray.span / ENTRY_PIXELS)), 1, ENTRY_STEPS);
+    for (int k = 0; k <= steps; ++k) {
+        float b = pixel_to_t(ray, mix(from, to, float(k) / float(steps)));
         float fb = wall_distance(ray, cls, SIDE_FRONT, b, 1.0);
-        if (fa < 0.0 && fb >= 0.0 && fb < HOLE) {
-            if (refine(ray, cls, SIDE_FRONT, 1.0, a, fa, b, fb, t) <= frame.search.y) return true;
-            jumped = true;
+        // A surface that begins or ends between the samples may be crossed before it does.
+        float last = b, f_last = fb, close = abs(ray.dir.z) * (b - a) + frame.search.z;
+        bool begins = k > 0 && fa >= HOLE && fb >= 0.0 && fb < close;
+        for (int i = 0; begins && fa >= 0.0 && i < EDGE_STEPS; ++i) {
+            float m = 0.5 * (a + b), f = wall_distance(ray, cls, SIDE_FRONT, m, 1.0);
+            bool behind = f >= 0.0 && f < HOLE;
+            if (behind) {
+                b = m;
+                fb = f;
+            } else {
+                a = m;
+                fa = f;
+            }
         }
-        a = b;
-        fa = fb;
+        bool ends = fb >= HOLE && fa > -close;
+        if (fa < 0.0 && fb >= 0.0 && (ends || fb < HOLE)) {
+            float residual = refine(ray, cls, SIDE_FRONT, 1.0, a, fa, b, fb, t);
+            if (residual <= (ends ? frame.search.x : frame.search.y)) return true;
+            jumped = jumped || !ends;
+        }
+        a = last;
+        fa = f_last;
     }
     return false;
 }
 
 // The nearest front surface of either class that a ray outside meets, or -1. The outcome says where
-// the ray left the view, or ran out of steps, before it left the liquid's box. Sets `jumped` where it passed behind a surface unseen.
+// the ray left the view, or ran out of steps, before it left the liquid's box. Sets `jumped` where it passed behind a
+// surface unseen.
 int find_entry(Ray ray, out float t, out int outcome, out bool jumped) {
     jumped = false;
-    float share = min(ENTRY_PIXELS / max(ray.span, 1e-6), 1.0);
-    float slack = frame.search.z;
+    float nudge = PIXEL_NUDGE / max(ray.span, 1e-6), slack = frame.search.z;
     vec2 p0 = project(ray.origin), p1 = project(ray.origin + ray.reach * ray.dir), way = p1 - p0;
     float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);
     float at = 0.0;
-    for (int i = 0; i < MARCH_STEPS && at - 0.5 * share < 1.0; ++i) {
+    for (int i = 0; i < MARCH_STEPS && at < 1.0; ++i) {
+        ivec2 pixel = nearest(p0 + min(at + nudge, 1.0) * way), tile = pixel / FRONT_TILE;
+        float d_at = 1.0 / mix(k0, k1, at);
         // A tile whose surfaces all lie before or behind the ray's way through it is left at once.
-        ivec2 pixel = nearest(p0 + min(at, 1.0) * way), tile = pixel / FRONT_TILE;
-        vec2 edge = float(FRONT_TILE) * (vec2(tile) + vec2(greaterThan(way, vec2(0.0))));
-        vec2 leave = mix((edge - p0) / way, vec2(1.0), lessThan(abs(way), vec2(1e-6)));
-        float end = clamp(min(leave.x, leave.y), min(at, 1.0), 1.0);
-        float d_in = 1.0 / mix(k0, k1, max(at - 0.5 * share, 0.0)), d_out = 1.0 / mix(k0, k1, end);
+        float end = leaves_cell(p0, way, tile * FRONT_TILE, FRONT_TILE, at + nudge), d_end = 1.0 / mix(k0, k1, end);
         float least = texelFetch(front_tiles, ivec3(tile, 0), 0).x, most = texelFetch(front_tiles, ivec3(tile, 1), 0).x;
-        if (max(d_in, d_out) < least - slack || min(d_in, d_out) > most + slack) {
-            at = max(end, at) + 0.25 * share;
+        if (max(d_at, d_end) < least - slack || min(d_at, d_end) > most + slack) {
+            at = end;
             continue;
         }
-        // One fetch a step and class tells whether a surface is near enough to look closely: within half the
-        // interpolated spread of the depths the ray has in this step.
-        float high = 1.0 / mix(k0, k1, min(at + 0.5 * share, 1.0));
+        // Pixel by pixel: its own depths tell whether a surface is near enough to look closely. What is interpolated
+        // in a pixel is within the spread of its own.
+        end = leaves_cell(p0, way, pixel, 1, at + nudge);
+        d_end = 1.0 / mix(k0, k1, end);
         float front_splash = HAS_SPLASH ? map_depth(CLASS_SPLASH, SIDE_FRONT, pixel) : 0.0;
         float front_body = HAS_BODY ? map_depth(CLASS_BODY, SIDE_FRONT, pixel) : 0.0;
-        float from = min(d_in, high) - 0.5 * slack, to = max(d_in, high) + 0.5 * slack;
+        float from = min(d_at, d_end) - slack, to = max(d_at, d_end) + slack;
         bool splash = front_splash >= from && front_splash <= to, body = front_body >= from && front_body <= to;
         if (splash || body) {
             float t_splash = 0.0, t_body = 0.0;
-            splash = splash && crosses_front(ray, CLASS_SPLASH, at, share, t_splash, jumped);
-            body = body && crosses_front(ray, CLASS_BODY, at, share, t_body, jumped);
+            splash = splash && crosses_front(ray, CLASS_SPLASH, at, end, t_splash, jumped);
+            body = body && crosses_front(ray, CLASS_BODY, at, end, t_body, jumped);
             if (splash || body) {
                 bool first = splash && (!body || t_splash <= t_body);
                 t = first ? t_splash : t_body;
@@ -314,9 +337,9 @@ int find_entry(Ray ray, out float t, out int outcome, out bool jumped) {
                 return first ? CLASS_SPLASH : CLASS_BODY;
             }
         }
-        at += share;
+        at = end;
     }
     t = 0.0;
-    outcome = at - 0.5 * share < 1.0 ? OUTCOME_NOT_CONVERGED : (ray.leaves ? OUTCOME_LEFT_VIEW : OUTCOME_HIT);
+    outcome = at < 1.0 ? OUTCOME_NOT_CONVERGED : (ray.leaves ? OUTCOME_LEFT_VIEW : OUTCOME_HIT);
     return -1;
 }

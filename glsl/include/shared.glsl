@@ -55,17 +55,21 @@
 #define FIT_UPDATE_LIMIT 4.0
 
 // Search along a ray: secant steps; pixels from sample to sample where an earlier wall is looked for, least and most, and
-// how many samples at most; pixels from sample to sample of the
-// marches to an entry and to an exit, the latter least and most, and samples at most; refinements of a bracket.
+// how many samples at most; pixels from sample to sample in a pixel with a front near the ray, and samples at most; how
+// far into the next pixel its address is taken; pixels from sample to sample of the march to an exit, least and most;
+// steps of a march at most; refinements of a bracket, and of the place where a surface begins.
 #define SECANT_STEPS 10
 #define CHECK_PIXELS 1.0
 #define CHECK_STRIDE 8.0
 #define CHECK_STEPS 64
-#define ENTRY_PIXELS 0.5
+#define ENTRY_PIXELS 0.125
+#define ENTRY_STEPS 12
+#define PIXEL_NUDGE 0.001
 #define EXIT_PIXELS 1.0
 #define EXIT_STRIDE 16.0
 #define MARCH_STEPS 1024
 #define REFINE_STEPS 24
+#define EDGE_STEPS 10
 
 // Tangent of the steepest surface (81 degrees against the view plane) for which strides are made short.
 #define STEEP 6.0

@@ -130,6 +130,8 @@ pub fn frame(job: &Job) -> serde_json::Value {
     let (s, radius) = (&job.settings, job.scene.particles.radius);
     let codes =
         |table: &[(u32, &'static str)]| table.iter().map(|(c, t)| (c.to_string(), *t)).collect::<BTreeMap<_, _>>();
+    let bounds = job.scene.particles.bounds().unwrap_or_default();
+    let search = job.camera.uniforms(s, job.size, radius, bounds).search;
     json!({
         "width": job.size[0],
         "height": job.size[1],
@@ -161,8 +163,8 @@ pub fn frame(job: &Job) -> serde_json::Value {
         "ior": s.ior,
         "absorption": s.absorption.to_array(),
         "sampling": {
-            "jump": meniscus::Camera::JUMP * radius,
-            "accepted": meniscus::Camera::ACCEPTED * radius,
+            "jump": search.z,
+            "accepted": search.y,
             "meaning": "maps are sampled bilinearly, normals with them, where all four pixels have a surface whose depths \
                         spread by at most `jump`, else at the nearest pixel; a hit has |f| of at most `accepted`",
         },
