@@ -12,6 +12,9 @@ mod shared;
 const SHADERS: &[(&str, &str, &[&str])] = &[
     ("OCCLUDE_COMP", "occlude.comp", &[]),
     ("CULL_COMP", "cull.comp", &[]),
+    ("COMPACT_COUNT_COMP", "compact.comp", &["COUNT"]),
+    ("COMPACT_SCAN_COMP", "compact.comp", &["SCAN"]),
+    ("COMPACT_SCATTER_COMP", "compact.comp", &["SCATTER"]),
     ("SPLAT_POINTS_VERT", "splat.vert", &[]),
     ("SPLAT_QUADS_VERT", "splat.vert", &["QUADS"]),
     ("SPLAT_FRAG", "splat.frag", &[]),

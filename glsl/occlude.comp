@@ -1,43 +1,42 @@
-// How deep the body certainly reaches at each pixel: the bounds against which the cull pass tests.
+// How deep the body certainly reaches at each pixel: the bounds against which the cull pass tests. The front map is at
+// most the front bound there, the back map at least the back bound.
 //
-// A ray that crosses an ellipsoid's cut at its centre's depth dc meets its front at or before dc and its back at or
-// beyond. Over the pixels of a square inside that cut, the front map is therefore at most dc and the back map at
-// least dc. Integer order equals float order for positive floats.
+// Every particle is cast at the pixels it covers, where its nearest or farthest depth promises something better than what
+// the pixel has already; which particles come first decides only how often that saves the work. Integer order equals float
+// order for positive floats.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "frame.glsl"
 #include "quadric.glsl"
+#include "particles.glsl"
+#include "groups.glsl"
 layout(local_size_x = PARTICLE_GROUP) in;
-layout(set = 0, binding = 1, std430) readonly buffer ParticleBlock { Particle at[]; } particles;
-layout(set = 0, binding = 2, std430) buffer BoundBlock { uint at[]; } bounds; // front bounds, then back bounds
-layout(push_constant) uniform PushBlock { Splat splat; };
+layout(set = 0, binding = 4, std430) buffer BoundBlock { uint at[]; } bounds; // front bounds, then back bounds
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= splat.range.y) return;
-    Ellipsoid e = to_eye(particles.at[splat.range.x + i]);
-    float dc = -e.center.z;
-    if (dc - sqrt(e.sd.z) <= frame.viewport.z) return;
-    // The cut at dc is { p : p^T Q p <= 1 } with Q the lateral block of S^-1; det and the cofactors give it directly.
-    float cxx = e.sd.y * e.sd.z - e.sm.z * e.sm.z;
-    float cyy = e.sd.x * e.sd.z - e.sm.y * e.sm.y;
-    float cxy = e.sm.y * e.sm.z - e.sm.x * e.sd.z;
-    float det = e.sd.x * cxx + e.sm.x * cxy + e.sm.y * (e.sm.x * e.sm.z - e.sd.y * e.sm.y);
-    vec2 aspect = abs(frame.to_pixel.xy) / dc; // pixels per world unit at dc
-    // The largest pixel square |dx|, |dy| <= w whose corners lie in the cut, less a hundredth of a pixel.
-    float q = cxx / (aspect.x * aspect.x) + cyy / (aspect.y * aspect.y) + 2.0 * abs(cxy) / (aspect.x * aspect.y);
-    if (!(det > 0.0) || !(q > 0.0)) return;
-    float w = sqrt(det / q) - 0.01;
-    vec2 center = project(e.center);
-    ivec2 lo = max(ivec2(ceil(center - w - 0.5)), ivec2(0));
-    ivec2 hi = min(ivec2(floor(center + w - 0.5)), ivec2(frame.viewport.xy) - 1);
+    uint i = invocation();
+    Particle p;
+    int cls;
+    if (i >= frame.particles.x || !particle(i, p, cls) || cls != CLASS_BODY) return;
+    Ellipsoid e = to_eye(p);
+    float near = -e.center.z - sqrt(e.sd.z), far = -e.center.z + sqrt(e.sd.z);
+    if (near <= frame.viewport.z) return;
+    vec4 box = pixel_bounds(e);
+    ivec2 lo = ivec2(ceil(box.xy - 0.5)), hi = ivec2(floor(box.zw - 0.5));
+    // Few particles are larger than 64 pixels, and those hide little that others do not.
+    if (any(greaterThanEqual(hi - lo, ivec2(LARGE)))) return;
+    Cast c = cast_of(e);
     uint width = uint(frame.viewport.x), pixels = width * uint(frame.viewport.y);
     for (int y = lo.y; y <= hi.y; ++y) {
         for (int x = lo.x; x <= hi.x; ++x) {
             uint pixel = uint(y) * width + uint(x);
-            atomicMin(bounds.at[pixel], floatBitsToUint(dc));
-            atomicMax(bounds.at[pixels + pixel], floatBitsToUint(dc));
+            bool front = floatBitsToUint(near) < bounds.at[pixel], back = floatBitsToUint(far) > bounds.at[pixels + pixel];
+            float nearer, farther;
+            if ((front || back) && hits(c, vec2(x, y) + 0.5, -1.0, nearer, farther)) {
+                if (front) atomicMin(bounds.at[pixel], floatBitsToUint(nearer));
+                if (back) atomicMax(bounds.at[pixels + pixel], floatBitsToUint(farther));
+            }
         }
     }
 }

@@ -7,6 +7,7 @@
 #include "shared.glsl"
 #include "frame.glsl"
 #include "normal.glsl"
+#include "quadric.glsl"
 layout(push_constant) uniform PushBlock { Splat splat; };
 layout(location = 0) flat in vec3 center;
 layout(location = 1) flat in vec3 g_diagonal;
@@ -14,11 +15,7 @@ layout(location = 2) flat in vec3 g_mixed;
 layout(location = 0) out float out_depth; // linear depth; negative where the near plane lies inside this particle
 layout(location = 1) out uint out_normal; // outward, eye space
 
-vec3 times_g(vec3 a) {
-    return vec3(g_diagonal.x * a.x + g_mixed.x * a.y + g_mixed.y * a.z,
-                g_mixed.x * a.x + g_diagonal.y * a.y + g_mixed.z * a.z,
-                g_mixed.y * a.x + g_mixed.z * a.y + g_diagonal.z * a.z);
-}
+vec3 times_g(vec3 a) { return times_shape(g_diagonal, g_mixed, a); }
 
 void main() {
     vec3 v = view_ray(gl_FragCoord.xy);
@@ -28,7 +25,7 @@ void main() {
     float discriminant = b * b - a * c;
     if (discriminant < 0.0) discard;
     float root = sqrt(discriminant), near = frame.viewport.z;
-    bool back = splat.range.w == SIDE_BACK;
+    bool back = splat.what.y == SIDE_BACK;
     float far_depth = center.z + (root - b) / a;
     if (far_depth < near) discard;
     float s = back ? (root - b) / a : (-root - b) / a;

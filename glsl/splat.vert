@@ -5,8 +5,8 @@
 #include "shared.glsl"
 #include "frame.glsl"
 #include "quadric.glsl"
-layout(set = 0, binding = 1, std430) readonly buffer ParticleBlock { Particle at[]; } particles;
-layout(set = 0, binding = 2, std430) readonly buffer VisibleBlock { uint at[]; } visible;
+#include "particles.glsl"
+layout(set = 0, binding = 4, std430) readonly buffer DrawnBlock { uint at[]; } drawn;
 layout(push_constant) uniform PushBlock { Splat splat; };
 layout(location = 0) flat out vec3 center; // eye space, z as depth
 layout(location = 1) flat out vec3 g_diagonal; // G = S^-1 in eye space: xx, yy, zz
@@ -14,25 +14,21 @@ layout(location = 2) flat out vec3 g_mixed;    // xy, xz, yz
 
 void main() {
 #ifdef QUADS
-    uint i = splat.range.x + gl_InstanceIndex;
+    uint rank = gl_InstanceIndex;
 #else
-    uint i = splat.range.x + gl_VertexIndex;
+    uint rank = gl_VertexIndex;
     gl_PointSize = 1.0;
 #endif
-    center = g_diagonal = g_mixed = vec3(0.0);
-    gl_Position = vec4(2.0, 2.0, 0.5, 1.0); // outside: clipped
-    uint bit = splat.range.w == SIDE_FRONT ? VISIBLE_FRONT : VISIBLE_BACK;
-    if ((visible.at[i] & bit) == 0u) return;
-    Ellipsoid e = to_eye(particles.at[i]);
+    // The list of this class and side (compact).
+    uint count = frame.particles.x;
+    Particle p;
+    int cls;
+    particle(drawn.at[splat.what.y * count + (splat.what.x == CLASS_SPLASH ? rank : count - 1u - rank)], p, cls);
+    Ellipsoid e = to_eye(p);
     vec4 box = pixel_bounds(e);
 
     center = vec3(e.center.xy, -e.center.z);
-    vec3 d = e.sd, m = e.sm;
-    vec3 cofactor = vec3(d.y * d.z - m.z * m.z, d.x * d.z - m.y * m.y, d.x * d.y - m.x * m.x);
-    vec3 cofactor_mixed = vec3(m.y * m.z - m.x * d.z, m.x * m.z - m.y * d.y, m.x * m.y - m.z * d.x);
-    float det = d.x * cofactor.x + m.x * cofactor_mixed.x + m.y * cofactor_mixed.y;
-    g_diagonal = cofactor / det;
-    g_mixed = cofactor_mixed / det;
+    inverse_shape(e, g_diagonal, g_mixed);
 
     vec2 scale = 2.0 / frame.viewport.xy;
 #ifdef QUADS

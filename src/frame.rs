@@ -6,18 +6,19 @@ use crate::{Error, passes::Passes, recorder::Recorder, settings::Settings, targe
 /// Records the passes of one frame. What a scene does not need is not there: no splash particles, no splash maps; one
 /// refraction, no back maps; no particles at all, only the background.
 pub(crate) fn record(r: &mut Recorder, passes: &mut Passes, needs: &Needs, settings: &Settings) -> Result<(), Error> {
-    if needs.splash + needs.body > 0 {
-        // Counters to zero, indirect draws to "everything as points".
+    if needs.count > 0 {
+        // Counters to zero, bounds to "nothing is certain".
         passes.reset.record(r, needs)?;
         // Which particles can show at all.
-        if needs.body > 0 && needs.occlusion {
+        if needs.body && needs.occlusion {
             passes.occlude.record(r, needs)?;
         }
         passes.cull.record(r, needs)?;
+        passes.compact.record(r, needs)?;
         // Nearest fronts and farthest backs of both classes, ray-cast (Imai16 §4.2).
         passes.splat.record(r, needs)?;
     }
-    if needs.body > 0 {
+    if needs.body {
         // The body's surfaces, smoothed (Imai16 §4.3). A smoothing filter goes here.
         for iteration in 0..needs.iterations {
             passes.plane_fit.record(r, needs, settings, iteration)?;

@@ -101,7 +101,8 @@ impl Table {
 #[derive(Clone, Copy)]
 pub(crate) struct Externals {
     pub frame_block: vk::Buffer,
-    pub particles: vk::Buffer,
+    /// Centres and shapes, where the host prepared them.
+    pub particles: [vk::Buffer; 3],
     pub environment: vk::ImageView,
     pub scene_color: (vk::ImageView, vk::ImageLayout),
     pub scene_depth: (vk::ImageView, vk::ImageLayout),
@@ -322,8 +323,10 @@ impl Recorder<'_> {
     pub fn buffer(&self, id: Id) -> vk::Buffer {
         match (id, self.table.get(id)) {
             (Id::FrameBlock, _) => self.externals.frame_block,
-            (Id::Particles, _) => self.externals.particles,
             (_, Some(Resource::Buffer(b))) => b.handle,
+            (Id::Centers, _) => self.externals.particles[0],
+            (Id::Diagonals, _) => self.externals.particles[1],
+            (Id::Mixed, _) => self.externals.particles[2],
             _ => panic!("a pass asks for the buffer {id:?}, which this frame does without"),
         }
     }

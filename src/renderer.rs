@@ -68,7 +68,8 @@ pub struct Renderer {
     slots: Vec<Slot>,
     retired: Retired,
     frame: u64,
-    particles: Option<Buffer>,
+    /// Centres, and the two halves of the shapes.
+    particles: Option<[Buffer; 3]>,
     scene: SceneBounds,
     environment: Option<Image>,
     plan: Vec<PlanEntry>,
@@ -145,7 +146,7 @@ impl Renderer {
     }
 
     /// Device memory that frames take, resource by resource, before anything is allocated. The particle buffer is
-    /// extra: 48 bytes a particle; a static environment map 16 bytes a texel.
+    /// extra: 36 bytes a particle; a static environment map 16 bytes a texel.
     pub fn memory_requirements(&self, needs: &Needs) -> Result<Vec<LedgerEntry>, Error> {
         self.check_size(needs.size)?;
         Ok(targets::ledger(&self.host.device, needs))
@@ -154,7 +155,8 @@ impl Renderer {
     /// Device memory in use now, resource by resource.
     pub fn memory(&self) -> Vec<LedgerEntry> {
         let mut ledger = self.table.ledger();
-        ledger.extend(self.particles.iter().map(|b| LedgerEntry { name: Id::Particles.name(), bytes: b.bytes }));
+        let particles = PARTICLE_ARRAYS.into_iter().zip(self.particles.iter().flatten());
+        ledger.extend(particles.map(|(id, b)| LedgerEntry { name: id.name(), bytes: b.bytes }));
         ledger.extend(self.environment.iter().map(|i| LedgerEntry { name: Id::Environment.name(), bytes: i.bytes }));
         ledger
     }
@@ -171,7 +173,6 @@ impl Renderer {
     /// frames that draw them have completed.
     pub fn set_particles(&mut self, particles: &Particles) -> Result<(), Error> {
         let count = particles.ellipsoids.len();
-        let bytes = (count.max(1) * size_of::<shader::Particle>()) as u64;
         if !(particles.radius.is_finite() && particles.radius > 0.0) {
             return Err(Error::parameter("particle radius", particles.radius, "use a finite length above 0"));
         }
@@ -182,31 +183,44 @@ impl Renderer {
                 format!("there are {count} particles"),
             ));
         }
-        let most = self.limits.storage_size / size_of::<shader::Particle>() as u64;
-        let most = most.min(u64::from(self.limits.groups) * u64::from(shader::PARTICLE_GROUP));
+        let most = (self.limits.storage_size / ARRAY_BYTES).min(MOST_PARTICLES);
         if count as u64 > most {
             return Err(Error::parameter("particles", count, format!("this device holds {most} at most")));
         }
-        let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
-        let mut buffer = Buffer::new(&self.host, Id::Particles.name(), bytes, usage, MemoryLocation::CpuToGpu)?;
+        let mut made = Vec::with_capacity(3);
+        for id in PARTICLE_ARRAYS {
+            let bytes = ARRAY_BYTES * count.max(1) as u64;
+            let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+            match Buffer::new(&self.host, id.name(), bytes, usage, MemoryLocation::CpuToGpu) {
+                Ok(buffer) => made.push(buffer),
+                Err(e) => {
+                    made.iter_mut().for_each(|b| b.destroy(&self.host));
+                    return Err(e);
+                }
+            }
+        }
+        let Ok(mut arrays) = <[Buffer; 3]>::try_from(made) else { unreachable!("one for each array") };
         let inverse = 1.0 / particles.radius;
         let mut bad = None;
         for (i, e) in particles.ellipsoids.iter().enumerate() {
-            let packed = pack(e.center, e.axes * inverse);
-            let sound =
-                packed.center.is_finite() && packed.shape_diagonal.is_finite() && packed.shape_mixed.is_finite();
-            if !sound && bad.is_none() {
+            let p = pack(e.center, e.axes * inverse);
+            // A splash's first number is negative (glsl/include/particles.glsl).
+            let sign = Vec3::new(if i < particles.splash_count { -1.0 } else { 1.0 }, 1.0, 1.0);
+            let parts = [p.center.truncate(), p.shape_diagonal.truncate() * sign, p.shape_mixed.truncate()];
+            if !parts.iter().all(|v| v.is_finite()) && bad.is_none() {
                 bad = Some(i);
             }
-            let at = i * size_of::<shader::Particle>();
-            buffer.mapped()[at..at + size_of::<shader::Particle>()].copy_from_slice(bytemuck::bytes_of(&packed));
+            let at = i * ARRAY_BYTES as usize;
+            for (array, part) in arrays.iter_mut().zip(&parts) {
+                array.mapped()[at..at + ARRAY_BYTES as usize].copy_from_slice(bytemuck::bytes_of(part));
+            }
         }
         if let Some(i) = bad {
-            buffer.destroy(&self.host);
+            arrays.iter_mut().for_each(|b| b.destroy(&self.host));
             let remedy = "centres and semi-axes over the radius have to be finite, squared too";
             return Err(Error::parameter("particles", format!("number {i} is out of range"), remedy));
         }
-        if let Some(old) = self.particles.replace(buffer) {
+        for old in self.particles.replace(arrays).into_iter().flatten() {
             self.retire(Resource::Buffer(old));
         }
         let bounds = particles.bounds().unwrap_or_default();
@@ -315,14 +329,16 @@ impl Renderer {
         self.table.discard_contents();
 
         let mut block = input.camera.uniforms(input.settings, self.size, self.scene.radius, self.scene.bounds);
-        block.particles.x = needs.splash;
-        block.particles.y = needs.body;
+        block.particles.x = needs.count;
         block.particles.z = self.limits.point_size as u32;
         block.particles.w = u32::from(input.settings.quads_only || self.limits.point_size <= 1.0);
         block.scene.w = f32::from(input.eye_inside);
         let mut externals = Externals {
             frame_block: slot.frame_block.handle,
-            particles: self.particles.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
+            particles: self
+                .particles
+                .as_ref()
+                .map_or([vk::Buffer::null(); 3], |b| [&b[0], &b[1], &b[2]].map(|b| b.handle)),
             environment,
             scene_color: (environment, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
             scene_depth: (environment, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
@@ -399,7 +415,7 @@ impl Renderer {
             table: &mut self.table,
             externals: Externals {
                 frame_block: vk::Buffer::null(),
-                particles: vk::Buffer::null(),
+                particles: [vk::Buffer::null(); 3],
                 environment: vk::ImageView::null(),
                 scene_color: Default::default(),
                 scene_depth: Default::default(),
@@ -443,9 +459,7 @@ impl Renderer {
     pub unsafe fn destroy(mut self) {
         self.table.retire_all(&mut self.retired, 0);
         self.retired.collect(&self.host, u64::MAX);
-        if let Some(mut b) = self.particles.take() {
-            b.destroy(&self.host);
-        }
+        self.particles.take().into_iter().flatten().for_each(|mut b| b.destroy(&self.host));
         if let Some(mut i) = self.environment.take() {
             i.destroy(&self.host);
         }
@@ -453,6 +467,12 @@ impl Renderer {
         self.passes.destroy(&self.host);
     }
 }
+
+/// Three arrays of three floats each hold the particles (glsl/include/particles.glsl).
+const PARTICLE_ARRAYS: [Id; 3] = [Id::Centers, Id::Diagonals, Id::Mixed];
+const ARRAY_BYTES: u64 = 12;
+/// Where indices of three floats each, or of a rectangle of work groups, would no longer fit 32 bits.
+const MOST_PARTICLES: u64 = 1 << 30;
 
 /// A particle as shaders read it; `axes` in particle radii.
 pub fn pack(center: Vec3, axes: Mat3) -> shader::Particle {

@@ -21,7 +21,7 @@ impl Slot {
         let size = |ty, count| vk::DescriptorPoolSize { ty, descriptor_count: count * SETS };
         let sizes = [
             size(vk::DescriptorType::UNIFORM_BUFFER, 1),
-            size(vk::DescriptorType::STORAGE_BUFFER, 5),
+            size(vk::DescriptorType::STORAGE_BUFFER, 6),
             size(vk::DescriptorType::SAMPLED_IMAGE, 8),
             size(vk::DescriptorType::STORAGE_IMAGE, 1),
         ];

@@ -8,9 +8,13 @@ use ash::vk::{self, BufferUsageFlags as B, Format as F, ImageUsageFlags as U};
 #[allow(missing_docs)] // each is described where it is made, in `spec`
 pub enum Id {
     FrameBlock,
-    Particles,
+    Centers,
+    Diagonals,
+    Mixed,
     Bounds,
     Visible,
+    Sums,
+    Drawn,
     Draws,
     Counters,
     SplatDepth,
@@ -32,9 +36,11 @@ pub enum Id {
 
 impl Id {
     /// Those the renderer makes for itself from [`Needs`], in the order of the memory ledger.
-    pub const OWN: [Id; 15] = [
+    pub const OWN: [Id; 17] = [
         Id::Bounds,
         Id::Visible,
+        Id::Sums,
+        Id::Drawn,
         Id::Draws,
         Id::Counters,
         Id::SplatDepth,
@@ -54,9 +60,13 @@ impl Id {
     pub fn name(self) -> &'static str {
         match self {
             Id::FrameBlock => "frame block",
-            Id::Particles => "particles",
+            Id::Centers => "particle centres",
+            Id::Diagonals => "particle shapes (diagonal)",
+            Id::Mixed => "particle shapes (mixed)",
             Id::Bounds => "body depth bounds",
             Id::Visible => "visible particles",
+            Id::Sums => "prefix sums",
+            Id::Drawn => "drawn particles",
             Id::Draws => "indirect draws",
             Id::Counters => "counters",
             Id::SplatDepth => "splat depth test",
@@ -83,10 +93,12 @@ impl Id {
 pub struct Needs {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Splash particles.
-    pub splash: u32,
-    /// Body particles.
-    pub body: u32,
+    /// Particles.
+    pub count: u32,
+    /// Whether any of them may be splash.
+    pub splash: bool,
+    /// Whether any of them may belong to the body.
+    pub body: bool,
     /// Surfaces at which light bends: 1, 2 or 4.
     pub refractions: u32,
     /// Iterations of plane fitting.
@@ -116,8 +128,9 @@ impl Needs {
     pub fn new(size: [u32; 2], splash: usize, body: usize, settings: &Settings, debug: bool) -> Needs {
         Needs {
             size,
-            splash: splash as u32,
-            body: body as u32,
+            count: (splash + body) as u32,
+            splash: splash > 0,
+            body: body > 0,
             refractions: settings.refractions,
             iterations: settings.iterations,
             occlusion: settings.occlusion_culling,
@@ -132,13 +145,13 @@ impl Needs {
 
     /// Whether rays look for a second volume, and so for tiles of front depths.
     pub fn tiles(&self) -> bool {
-        self.refractions == 4 && self.splash + self.body > 0
+        self.refractions == 4 && self.count > 0
     }
 
     /// Final depth and normal of a class; of the other class where this one has no particles, and so no maps: the
     /// shader then does not look, but something has to be bound.
     pub(crate) fn maps_or_other(&self, body: bool) -> (Id, Id) {
-        if self.body > 0 && (body || self.splash == 0) {
+        if self.body && (body || !self.splash) {
             (self.body_depth(), self.body_normal())
         } else {
             (Id::SplashDepth, Id::SplashNormal)
@@ -161,8 +174,8 @@ impl Needs {
 
     /// How a resource is made for this frame; `None` where the frame does without it.
     pub fn spec(&self, id: Id) -> Option<Spec> {
-        let (splash, body) = (self.splash > 0, self.body > 0);
-        let any = splash || body;
+        let (splash, body, any) = (self.splash, self.body, self.count > 0);
+        let count = u64::from(self.count);
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let image = |format, layers, array, usage| {
             Some(Spec::Image(ImageSpec { format, size: self.size, layers, array, usage }))
@@ -178,9 +191,13 @@ impl Needs {
         match id {
             // Two 32-bit bounds a pixel: nearest and farthest depth that the body certainly reaches.
             Id::Bounds if body && self.occlusion => buffer(8 * pixels, B::empty()),
-            // A word a particle: the sides on which it shows.
-            Id::Visible if any => buffer(4 * u64::from(self.splash + self.body), B::empty()),
-            Id::Draws if any => buffer(2 * size_of::<shader::Draws>() as u64, B::INDIRECT_BUFFER),
+            // A word a particle: its class and the sides on which it shows.
+            Id::Visible if any => buffer(4 * count, B::empty()),
+            // Counts of each block's particles in each list, and the lists' totals.
+            Id::Sums if any => buffer(16 * (count.div_ceil(u64::from(shader::BLOCK)) + 1), B::empty()),
+            // The lists: for each side splashes from the start, the body from the end.
+            Id::Drawn if any => buffer(4 * u64::from(self.sides()) * count, B::empty()),
+            Id::Draws if any => buffer(4 * size_of::<shader::Draws>() as u64, B::INDIRECT_BUFFER),
             Id::Counters if any => buffer(4 * u64::from(shader::COUNTERS), B::empty()),
             // The depth test of whichever class and side is being drawn.
             Id::SplatDepth if any => image(F::D32_SFLOAT, 1, false, U::DEPTH_STENCIL_ATTACHMENT),

@@ -58,3 +58,46 @@ vec4 pixel_bounds(Ellipsoid e) {
     vec2 hi = min(max(a, b) + 0.01, frame.viewport.xy);
     return vec4(lo, hi);
 }
+
+// G = S^-1 from S by cofactors: xx, yy, zz and xy, xz, yz.
+void inverse_shape(Ellipsoid e, out vec3 diagonal, out vec3 mixed_part) {
+    vec3 d = e.sd, m = e.sm;
+    vec3 cofactor = vec3(d.y * d.z - m.z * m.z, d.x * d.z - m.y * m.y, d.x * d.y - m.x * m.x);
+    vec3 cofactor_mixed = vec3(m.y * m.z - m.x * d.z, m.x * m.z - m.y * d.y, m.x * m.y - m.z * d.x);
+    float det = d.x * cofactor.x + m.x * cofactor_mixed.x + m.y * cofactor_mixed.y;
+    diagonal = cofactor / det;
+    mixed_part = cofactor_mixed / det;
+}
+
+vec3 times_shape(vec3 diagonal, vec3 mixed_part, vec3 a) {
+    return vec3(diagonal.x * a.x + mixed_part.x * a.y + mixed_part.y * a.z,
+                mixed_part.x * a.x + diagonal.y * a.y + mixed_part.z * a.z,
+                mixed_part.y * a.x + mixed_part.z * a.y + diagonal.z * a.z);
+}
+
+// An ellipsoid ready to be cast: its centre with z as depth, and G.
+struct Cast {
+    vec3 center;
+    vec3 diagonal;
+    vec3 mixed_part;
+};
+
+Cast cast_of(Ellipsoid e) {
+    Cast c;
+    c.center = vec3(e.center.xy, -e.center.z);
+    inverse_shape(e, c.diagonal, c.mixed_part);
+    return c;
+}
+
+// Depths at which a pixel's ray enters and leaves, as splat.frag has them but for rounding. Where rounding could decide
+// whether the ray hits at all, `slack` does: 1 says it does, -1 that it does not.
+bool hits(Cast c, vec2 pixel, float slack, out float nearer, out float farther) {
+    vec3 v = view_ray(pixel), q = vec3(c.center.z * v.xy - c.center.xy, 0.0);
+    float a = dot(v, times_shape(c.diagonal, c.mixed_part, v)), b = dot(v, times_shape(c.diagonal, c.mixed_part, q));
+    float discriminant = b * b - a * (dot(q, times_shape(c.diagonal, c.mixed_part, q)) - 1.0);
+    discriminant += slack * SILHOUETTE * (b * b + a);
+    float root = sqrt(max(discriminant, 0.0));
+    nearer = c.center.z - (root + b) / a;
+    farther = c.center.z + (root - b) / a;
+    return discriminant >= 0.0;
+}

@@ -38,6 +38,16 @@
 // Which particles a class draws on which side; bits of the cull pass's verdict.
 #define VISIBLE_FRONT 1
 #define VISIBLE_BACK 2
+#define VISIBLE_BODY 4 // set where the particle belongs to the body
+
+// Culling: particles of more pixels an edge are always drawn and hide nothing; room for the rounding of a discriminant of
+// order one, and of a depth in particle radii. Compilers may round the same formula differently in different shaders.
+#define LARGE 64
+#define SILHOUETTE 0.0001
+#define DEPTH_ROUNDING 0.001
+
+// Items that one group of 64 sorts or compacts.
+#define BLOCK 1024
 
 // Slots of the counter buffer: guards and culling, summed over the frame.
 #define COUNT_SPLASH_FRONT 0
@@ -48,7 +58,9 @@
 #define COUNT_FIT_GRAZING 5
 #define COUNT_FIT_UNBOUNDED 6
 #define COUNT_NORMAL_DEGENERATE 7
-#define COUNTERS 8
+#define COUNT_LARGE_SPLASH 8
+#define COUNT_LARGE_BODY 9
+#define COUNTERS 10
 
 // Plane fitting: below this |n.v| eq. (5) is not trusted; an update longer than this many sigma is not taken.
 #define FIT_GRAZING_LIMIT 0.01
@@ -74,7 +86,8 @@
 // Tangent of the steepest surface (81 degrees against the view plane) for which strides are made short.
 #define STEEP 6.0
 
-// One particle: eye-independent, as drawn.
+// One particle, as drawn: eye-independent. In memory it is three arrays of three floats, with the class as a sign (see
+// particles.glsl).
 struct Particle {
     vec4 center;         // xyz: world position
     vec4 shape_diagonal; // xx, yy, zz of S = A A^T / r^2, A's columns the semi-axes
@@ -93,10 +106,10 @@ struct Frame {
     vec4 bounds_min;   // world box around everything drawn
     vec4 bounds_max;
     vec4 scene;        // host scene: P22, P23, cleared depth value; w: 1 if the eye is inside the body
-    uvec4 particles;   // splash count, body count, largest point size in pixels, 1 to draw quads only
+    uvec4 particles;   // count; unused; largest point size in pixels; 1 to draw quads only
 };
 
-// Indirect draws of one class: points, then quads (VkDrawIndirectCommand each).
+// Indirect draws of one class and side: points, then quads (VkDrawIndirectCommand each).
 struct Draws {
     uvec4 points; // vertices, instances, first vertex, first instance
     uvec4 quads;
@@ -104,5 +117,5 @@ struct Draws {
 
 // Push constants of the particle passes.
 struct Splat {
-    uvec4 range; // first particle, count, class, side
+    uvec4 what; // class, side, 2 unused
 };

@@ -1,5 +1,6 @@
 //! The passes of a frame: one file each, the same stem as its shader, twin and test.
 
+pub(crate) mod compact;
 pub(crate) mod cull;
 pub(crate) mod normals;
 pub(crate) mod occlude;
@@ -11,13 +12,14 @@ pub(crate) mod tiles;
 
 use crate::{
     Error,
+    access::Access,
     device::{Host, Limits},
     pipeline::Pipeline,
-    shader::{CLASS_BODY, CLASS_SPLASH, Splat},
-    targets::Needs,
+    recorder::{Use, bound},
+    shader::{BLOCK, CLASS_BODY, CLASS_SPLASH, PARTICLE_GROUP},
+    targets::{Id, Needs},
 };
 use ash::vk;
-use glam::UVec4;
 use std::collections::HashMap;
 
 /// All passes, made once for a device and an output format.
@@ -25,6 +27,7 @@ pub(crate) struct Passes {
     pub reset: reset::Reset,
     pub occlude: occlude::Occlude,
     pub cull: cull::Cull,
+    pub compact: compact::Compact,
     pub splat: splat::SplatPass,
     pub plane_fit: plane_fit::PlaneFit,
     pub normals: normals::Normals,
@@ -38,6 +41,7 @@ impl Passes {
             reset: reset::Reset,
             occlude: occlude::Occlude::default(),
             cull: cull::Cull::default(),
+            compact: compact::Compact::default(),
             splat: splat::SplatPass::new(limits),
             plane_fit: plane_fit::PlaneFit::default(),
             normals: normals::Normals::default(),
@@ -49,6 +53,7 @@ impl Passes {
     pub fn destroy(&mut self, host: &Host) {
         self.occlude.pipelines.destroy(host);
         self.cull.pipelines.destroy(host);
+        self.compact.pipelines.destroy(host);
         self.splat.pipelines.destroy(host);
         self.plane_fit.pipelines.destroy(host);
         self.normals.pipelines.destroy(host);
@@ -80,16 +85,36 @@ impl<K: std::hash::Hash + Eq + Clone> Pipelines<K> {
     }
 }
 
-/// The classes that have particles: class, and its range in the particle buffer, as push constants.
-fn classes(needs: &Needs) -> impl Iterator<Item = (u32, Splat)> {
-    let ranges = [(CLASS_SPLASH, 0, needs.splash), (CLASS_BODY, needs.splash, needs.body)];
-    ranges
-        .into_iter()
-        .filter(|(_, _, count)| *count > 0)
-        .map(|(class, first, count)| (class, Splat { range: UVec4::new(first, count, class, 0) }))
+/// The classes that may have particles.
+fn classes(needs: &Needs) -> impl Iterator<Item = u32> {
+    [(CLASS_SPLASH, needs.splash), (CLASS_BODY, needs.body)].into_iter().filter(|(_, there)| *there).map(|(c, _)| c)
+}
+
+/// The particles as drawn, at the bindings of `glsl/include/particles.glsl`.
+const fn particles(access: Access) -> [Use; 3] {
+    [bound(1, Id::Centers, access), bound(2, Id::Diagonals, access), bound(3, Id::Mixed, access)]
 }
 
 /// Groups that cover `count` invocations.
 fn groups(count: u32, group: u32) -> u32 {
     count.div_ceil(group)
+}
+
+/// A rectangle of at least so many groups, no longer than any device allows (`glsl/include/groups.glsl`).
+fn rectangle(groups: u32) -> [u32; 2] {
+    let rows = groups.div_ceil(MOST_GROUPS).max(1);
+    [groups.div_ceil(rows), rows]
+}
+
+/// What Vulkan guarantees of maxComputeWorkGroupCount.
+const MOST_GROUPS: u32 = 65535;
+
+/// The rectangle of groups with an invocation for each particle.
+fn per_particle(needs: &Needs) -> [u32; 2] {
+    rectangle(groups(needs.count, PARTICLE_GROUP))
+}
+
+/// The rectangle of groups with a block of particles each.
+fn per_block(needs: &Needs) -> [u32; 2] {
+    rectangle(groups(needs.count, BLOCK))
 }

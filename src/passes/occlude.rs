@@ -1,12 +1,12 @@
 //! How deep the body certainly reaches at each pixel (`glsl/occlude.comp`): what [`super::cull`] tests against.
 
-use super::{Pipelines, classes, groups};
+use super::{Pipelines, particles, per_particle};
 use crate::{
     Error,
     access::Access,
     pipeline::Pipeline,
-    recorder::{Recorder, Use, bound},
-    shader::{CLASS_BODY, OCCLUDE_COMP, PARTICLE_GROUP, Splat},
+    recorder::{Recorder, bound},
+    shader::OCCLUDE_COMP,
     targets::{Id, Needs},
 };
 
@@ -15,19 +15,16 @@ pub(crate) struct Occlude {
     pub pipelines: Pipelines<()>,
 }
 
-const USES: [Use; 2] = [bound(1, Id::Particles, Access::ComputeRead), bound(2, Id::Bounds, Access::ComputeReadWrite)];
-
 impl Occlude {
     pub fn record(&mut self, r: &mut Recorder, needs: &Needs) -> Result<(), Error> {
         let host = r.host;
-        let pipeline =
-            self.pipelines.get((), |()| Pipeline::compute(host, &OCCLUDE_COMP, &[], size_of::<Splat>() as u32))?;
-        r.pass("occlude", &USES, |r| {
-            r.bind(pipeline, &USES)?;
-            for (_, splat) in classes(needs).filter(|(class, _)| *class == CLASS_BODY) {
-                r.push(pipeline, &splat);
-                r.dispatch(groups(splat.range.y, PARTICLE_GROUP), 1, 1);
-            }
+        let [centers, diagonals, mixed] = particles(Access::ComputeRead);
+        let uses = [centers, diagonals, mixed, bound(4, Id::Bounds, Access::ComputeReadWrite)];
+        let pipeline = self.pipelines.get((), |()| Pipeline::compute(host, &OCCLUDE_COMP, &[], 0))?;
+        r.pass("occlude", &uses, |r| {
+            r.bind(pipeline, &uses)?;
+            let [x, y] = per_particle(needs);
+            r.dispatch(x, y, 1);
             Ok(())
         })
     }

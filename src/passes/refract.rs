@@ -37,7 +37,7 @@ impl Refract {
     }
 
     pub fn record(&mut self, r: &mut Recorder, needs: &Needs, settings: &Settings) -> Result<(), Error> {
-        let (splash, body) = (needs.splash > 0, needs.body > 0);
+        let (splash, body) = (needs.splash, needs.body);
         let ((body_depth, body_normal), (splash_depth, splash_normal)) =
             (needs.maps_or_other(true), needs.maps_or_other(false));
         // Without a second volume there are no tiles, and the shader does not look.

@@ -1,29 +1,24 @@
-//! Brings what the particle passes count and bound to its start: nothing counted, nothing certain, all as points.
+//! Brings what the particle passes count and bound to its start: nothing counted, nothing certain.
 
 use crate::{
     Error,
     access::Access,
     recorder::{Recorder, used},
-    shader::Draws,
     targets::{Id, Needs},
 };
 use ash::vk;
-use glam::UVec4;
 
 pub(crate) struct Reset;
 
 impl Reset {
     pub fn record(&self, r: &mut Recorder, needs: &Needs) -> Result<(), Error> {
-        let all = [Id::Bounds, Id::Draws, Id::Counters].map(|id| used(id, Access::TransferWrite));
+        let all = [Id::Bounds, Id::Counters].map(|id| used(id, Access::TransferWrite));
         let uses = if needs.spec(Id::Bounds).is_some() { &all[..] } else { &all[1..] };
         r.pass("reset", uses, |r| {
-            let draws = [needs.splash, needs.body]
-                .map(|count| Draws { points: UVec4::new(count, 1, 0, 0), quads: UVec4::new(4, 0, 0, 0) });
             let (device, cmd) = (&r.host.device, r.cmd);
             // SAFETY: `cmd` is recording outside rendering; the ranges lie inside the buffers, which were made for
             // these needs with TRANSFER_DST.
             unsafe {
-                device.cmd_update_buffer(cmd, r.buffer(Id::Draws), 0, bytemuck::cast_slice(&draws));
                 device.cmd_fill_buffer(cmd, r.buffer(Id::Counters), 0, vk::WHOLE_SIZE, 0);
                 if needs.spec(Id::Bounds).is_some() {
                     let half = 4 * u64::from(needs.size[0]) * u64::from(needs.size[1]);

@@ -1,7 +1,7 @@
 //! Nearest front and farthest back of each class, ray-cast from point sprites or quads (`glsl/splat.vert`,
 //! `glsl/splat.frag`; Imai16 §4.2, Sigg06).
 
-use super::{Pipelines, classes};
+use super::{Pipelines, classes, particles};
 use crate::{
     Error,
     access::Access,
@@ -12,6 +12,7 @@ use crate::{
     targets::{Id, Needs},
 };
 use ash::vk;
+use glam::UVec4;
 
 pub(crate) struct SplatPass {
     /// By "quads".
@@ -20,10 +21,13 @@ pub(crate) struct SplatPass {
     points: bool,
 }
 
-fn uses(depth: Id, normal: Id) -> [Use; 6] {
+fn uses(depth: Id, normal: Id) -> [Use; 8] {
+    let [centers, diagonals, mixed] = particles(Access::VertexRead);
     [
-        bound(1, Id::Particles, Access::VertexRead),
-        bound(2, Id::Visible, Access::VertexRead),
+        centers,
+        diagonals,
+        mixed,
+        bound(4, Id::Drawn, Access::VertexRead),
         used(Id::Draws, Access::IndirectRead),
         used(depth, Access::ColorAttachment),
         used(normal, Access::ColorAttachment),
@@ -37,16 +41,15 @@ impl SplatPass {
     }
 
     pub fn record(&mut self, r: &mut Recorder, needs: &Needs) -> Result<(), Error> {
-        for (class, mut splat) in classes(needs) {
+        for class in classes(needs) {
             for side in [SIDE_FRONT, SIDE_BACK].into_iter().take(needs.sides() as usize) {
-                splat.range.w = side;
-                self.draw(r, class, side, &splat)?;
+                self.draw(r, class, side)?;
             }
         }
         Ok(())
     }
 
-    fn draw(&mut self, r: &mut Recorder, class: u32, side: u32, splat: &Splat) -> Result<(), Error> {
+    fn draw(&mut self, r: &mut Recorder, class: u32, side: u32) -> Result<(), Error> {
         let (name, depth, normal) = match (class == CLASS_SPLASH, side == SIDE_FRONT) {
             (true, true) => ("splash front", Id::SplashDepth, Id::SplashNormal),
             (true, false) => ("splash back", Id::SplashDepth, Id::SplashNormal),
@@ -54,6 +57,7 @@ impl SplatPass {
             (false, false) => ("body back", Id::BodyDepthRaw, Id::BodyNormalRaw),
         };
         let uses = uses(depth, normal);
+        let splat = Splat { what: UVec4::new(class, side, 0, 0) };
         // The depth test works on near / d: nearest is largest. Nothing there: 0 for fronts, 1 for backs.
         let (compare, clear) =
             if side == SIDE_FRONT { (vk::CompareOp::GREATER, 0.0) } else { (vk::CompareOp::LESS, 1.0) };
@@ -83,12 +87,12 @@ impl SplatPass {
                         )
                     })?;
                     r.bind(pipeline, &uses)?;
-                    r.push(pipeline, splat);
-                    // One of the two draws nothing: the cull pass chose.
+                    r.push(pipeline, &splat);
+                    // One of the two draws nothing: the compact pass chose.
                     let half = size_of::<shader::Draws>() as u64 / 2;
-                    let offset = u64::from(class) * 2 * half + if quads { half } else { 0 };
-                    // SAFETY: inside rendering with a graphics pipeline bound; the arguments were written by `reset`
-                    // and `cull`, and made visible to this stage by this pass's declaration.
+                    let offset = u64::from(2 * class + side) * 2 * half + if quads { half } else { 0 };
+                    // SAFETY: inside rendering with a graphics pipeline bound; the arguments were written by
+                    // `compact`, and made visible to this stage by this pass's declaration.
                     unsafe {
                         host.device.cmd_set_depth_compare_op(r.cmd, compare);
                         host.device.cmd_draw_indirect(r.cmd, r.buffer(Id::Draws), offset, 1, 0);

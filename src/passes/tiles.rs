@@ -25,7 +25,7 @@ impl Tiles {
             bound(3, Id::FrontTiles, Access::ComputeWrite),
         ];
         let host = r.host;
-        let key = [u32::from(needs.splash > 0), u32::from(needs.body > 0)];
+        let key = [u32::from(needs.splash), u32::from(needs.body)];
         let pipeline = self.pipelines.get(key, |key| Pipeline::compute(host, &TILES_COMP, key, 0))?;
         r.pass("tiles", &uses, |r| {
             r.bind(pipeline, &uses)?;

@@ -1,7 +1,7 @@
 //! Twin of `glsl/cull.comp`: which particles can show, and how many of each class.
 
-use super::quadric::{PAD, Quadric, pixels_in, viewport};
-use crate::shader::{Frame, Particle, VISIBLE_BACK, VISIBLE_FRONT};
+use super::quadric::{PAD, Quadric, pixel_ray, pixels_in, viewport};
+use crate::shader::{DEPTH_ROUNDING, Frame, LARGE, Particle, SILHOUETTE, VISIBLE_BACK, VISIBLE_FRONT};
 
 /// What the cull pass found for one class.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,9 +14,6 @@ pub struct Culled {
     pub largest_point: f64,
 }
 
-/// Rectangles with an edge of more pixels than this are not walked: such a particle shows.
-const WALKED: u32 = 64;
-
 /// Tests one class against the occlusion bounds, front then back in one slice (floats' bits, as in the GPU's buffer);
 /// `None` where nothing is bounded. `sides` is 1 if only fronts are drawn.
 pub fn cull(frame: &Frame, particles: &[Particle], bounds: Option<&[u32]>, sides: u32) -> Culled {
@@ -24,23 +21,26 @@ pub fn cull(frame: &Frame, particles: &[Particle], bounds: Option<&[u32]>, sides
     let pixels = (width * height) as usize;
     let wanted = if sides == 2 { VISIBLE_FRONT | VISIBLE_BACK } else { VISIBLE_FRONT };
     let mut culled = Culled { verdicts: Vec::with_capacity(particles.len()), counts: [0, 0], largest_point: 0.0 };
+    let rounding = f64::from(DEPTH_ROUNDING) * f64::from(frame.viewport.w);
     for particle in particles {
         let q = Quadric::new(frame, particle);
         let rectangle = q.rectangle(frame, PAD);
         let mut verdict = 0;
         if let Some([columns, rows]) = rectangle.and_then(pixels_in) {
-            let small = columns[1] - columns[0] < WALKED && rows[1] - rows[0] < WALKED;
-            let [nearest, farthest] = q.reach();
+            let small = columns[1] - columns[0] < LARGE && rows[1] - rows[0] < LARGE;
+            let [nearest, _] = q.reach();
             match bounds {
                 Some(bounds) if small && nearest > near => {
                     let bound = |i: usize| f64::from(f32::from_bits(bounds[i]));
                     for y in rows[0]..=rows[1] {
                         for x in columns[0]..=columns[1] {
                             let pixel = (y * width + x) as usize;
-                            if nearest <= bound(pixel) {
+                            // Rays that only just miss count as hits; comparisons with what is no number fail.
+                            let [enter, leave] = q.cast_with_slack(pixel_ray(frame, x, y), f64::from(SILHOUETTE));
+                            if enter - rounding <= bound(pixel) {
                                 verdict |= VISIBLE_FRONT;
                             }
-                            if farthest >= bound(pixels + pixel) {
+                            if leave + rounding >= bound(pixels + pixel) {
                                 verdict |= VISIBLE_BACK;
                             }
                         }

@@ -2,6 +2,7 @@
 //! Tests feed them the GPU's own inputs and compare.
 
 pub mod background;
+pub mod compact;
 pub mod cull;
 pub mod normal;
 pub mod normals;

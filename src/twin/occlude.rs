@@ -1,12 +1,10 @@
 //! Twin of `glsl/occlude.comp`: how deep the body certainly reaches at each pixel.
 //!
-//! The plane of depth dc through an ellipsoid's centre cuts it in { p : pᵀ Q p ≤ 1 }, Q the lateral block of S⁻¹.
-//! A ray through that cut meets the front at or before dc and the back at or beyond; the twin, as the shader, bounds
-//! the pixels of the largest square inside the cut.
+//! Every particle is cast at every pixel of its rectangle; the front map is at most the nearest entry, the back map at
+//! least the farthest exit.
 
-use super::quadric::{Quadric, scale_offset, viewport};
-use crate::shader::{Frame, Particle};
-use glam::{DVec2, DVec3};
+use super::quadric::{PAD, Quadric, pixel_ray, pixels_in, viewport};
+use crate::shader::{Frame, LARGE, Particle};
 
 /// Front and back bounds, pixel by pixel; infinity and 0 where nothing is certain.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,35 +15,28 @@ pub struct Bounds {
     pub back: Vec<f64>,
 }
 
-/// The bounds from the body's particles, with squares `pad` pixels smaller on each side than they could be (the
-/// shader: [`super::quadric::PAD`]).
-pub fn occlude(frame: &Frame, body: &[Particle], pad: f64) -> Bounds {
+/// The bounds from the body's particles, where the rays that only graze one are left out: `slack` (the shader:
+/// `SILHOUETTE`) is how much of the discriminant does not count.
+pub fn occlude(frame: &Frame, body: &[Particle], slack: f64) -> Bounds {
     let (width, height, near) = viewport(frame);
     let pixels = (width * height) as usize;
     let mut bounds = Bounds { front: vec![f64::INFINITY; pixels], back: vec![0.0; pixels] };
-    let (scale, offset) = scale_offset(frame);
     for particle in body {
         let q = Quadric::new(frame, particle);
-        let depth = -q.center.z;
         if q.reach()[0] <= near {
             continue;
         }
-        // Half the square's edge: pᵀ Q p at the corner of a square of half edge 1, the worse of its two diagonals.
-        let inverse = q.to_unit.transpose() * q.to_unit;
-        let corner = |sign: f64| {
-            let p = DVec3::new(depth / scale.x.abs(), sign * depth / scale.y.abs(), 0.0);
-            p.dot(inverse * p)
-        };
-        let half = corner(1.0).max(corner(-1.0)).sqrt().recip() - pad;
-        let center = scale * (q.center.truncate() / depth) + offset;
-        let size = DVec2::new(f64::from(width), f64::from(height));
-        let lo = (center - half - 0.5).ceil().max(DVec2::ZERO);
-        let hi = (center + half - 0.5).floor().min(size - 1.0);
-        for y in lo.y as i64..=hi.y as i64 {
-            for x in lo.x as i64..=hi.x as i64 {
-                let pixel = (y * i64::from(width) + x) as usize;
-                bounds.front[pixel] = bounds.front[pixel].min(depth);
-                bounds.back[pixel] = bounds.back[pixel].max(depth);
+        let Some([columns, rows]) = q.rectangle(frame, PAD).and_then(pixels_in) else { continue };
+        if columns[1] - columns[0] >= LARGE || rows[1] - rows[0] >= LARGE {
+            continue;
+        }
+        for y in rows[0]..=rows[1] {
+            for x in columns[0]..=columns[1] {
+                let [nearer, farther] = q.cast_with_slack(pixel_ray(frame, x, y), -slack);
+                // Misses are not numbers, and change nothing.
+                let pixel = (y * width + x) as usize;
+                bounds.front[pixel] = bounds.front[pixel].min(nearer);
+                bounds.back[pixel] = bounds.back[pixel].max(farther);
             }
         }
     }

@@ -84,6 +84,16 @@ impl Quadric {
         Cast { depths: [middle - half, middle + half], approach }
     }
 
+    /// Depths at which the ray x = `v` d enters and leaves an ellipsoid whose discriminant is larger by `slack` times
+    /// b² + a, of a s² + 2 b s + c = 0 for the depth s behind the centre's; not numbers if it misses even so.
+    pub fn cast_with_slack(&self, v: DVec3, slack: f64) -> [f64; 2] {
+        let depth = -self.center.z;
+        let (w, u) = (self.to_unit * v, self.to_unit * (v * depth - self.center));
+        let (a, b, c) = (w.length_squared(), u.dot(w), u.length_squared() - 1.0);
+        let root = (b * b - a * c + slack * (b * b + a)).sqrt();
+        [depth - (b + root) / a, depth + (root - b) / a]
+    }
+
     /// Outward unit normal at a point of the surface: the gradient of |L⁻¹ (x - c)|².
     pub fn normal(&self, x: DVec3) -> DVec3 {
         (self.to_unit.transpose() * (self.to_unit * (x - self.center))).normalize()

@@ -10,9 +10,10 @@ use meniscus::{Equirect, FrameInput, Settings};
 
 /// Every target that a pass reads: the pass, the target, the stage that wrote it, the stage that reads it. Of several
 /// passes that read in the same stage only the first needs a barrier.
-const READS: [(&str, Id, S, S); 14] = [
+const READS: [(&str, Id, S, S); 15] = [
     ("cull", Id::Bounds, S::COMPUTE_SHADER, S::COMPUTE_SHADER),
-    ("splash front", Id::Visible, S::COMPUTE_SHADER, S::VERTEX_SHADER),
+    ("compact", Id::Visible, S::COMPUTE_SHADER, S::COMPUTE_SHADER),
+    ("splash front", Id::Drawn, S::COMPUTE_SHADER, S::VERTEX_SHADER),
     ("splash front", Id::Draws, S::COMPUTE_SHADER, S::DRAW_INDIRECT),
     ("plane fit", Id::BodyDepthRaw, S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),
     ("plane fit", Id::BodyNormalRaw, S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),

@@ -10,7 +10,9 @@ use meniscus::{
     Camera, Ellipsoid, Particles,
     host::Instance,
     prepare::{Input, Options, prepare},
-    shader::{CLASS_BODY, CLASS_SPLASH, COUNT_SPLASH_FRONT, SIDE_BACK, SIDE_FRONT},
+    shader::{
+        CLASS_BODY, CLASS_SPLASH, COUNT_SPLASH_FRONT, SIDE_BACK, SIDE_FRONT, VISIBLE_BACK, VISIBLE_BODY, VISIBLE_FRONT,
+    },
     targets::Id,
     twin::{cull::cull, splat::splat},
 };
@@ -28,9 +30,9 @@ pub fn assert_same(a: &Shot, b: &Shot, what: &str) {
 
 /// Whether the cull pass chose quads for a class.
 pub fn drawn_as_quads(shot: &Shot, class: u32) -> bool {
-    let draws = &shot.words(Id::Draws, 0).expect("there are particles")[8 * class as usize..][..8];
+    let draws = &shot.words(Id::Draws, 0).expect("there are particles")[16 * class as usize..][..8];
     let quads = draws[5] > 0;
-    assert!(quads != (draws[1] > 0), "either points or quads: {draws:?}");
+    assert!(quads != (draws[0] > 0), "either points or quads: {draws:?}");
     quads
 }
 
@@ -62,7 +64,9 @@ pub fn around_the_near_plane() -> Case {
 /// Verdicts of one class as the GPU has them.
 fn verdicts(shot: &Shot, particles: &Particles, class: u32) -> Vec<u32> {
     let (splash, body) = shot.words(Id::Visible, 0).expect("there are particles").split_at(particles.splash_count);
-    if class == CLASS_SPLASH { splash.to_vec() } else { body.to_vec() }
+    let (words, mark) = if class == CLASS_SPLASH { (splash, 0) } else { (body, VISIBLE_BODY) };
+    assert!(words.iter().all(|v| *v == 0 || v & VISIBLE_BODY == mark), "every particle knows its class");
+    words.iter().map(|v| v & (VISIBLE_FRONT | VISIBLE_BACK)).collect()
 }
 
 /// Largest point of a driver, in pixels.

@@ -120,7 +120,7 @@ fn memory_is_known_before_it_is_allocated() {
                 assert!(got.contains(entry), "{}: asked {entry:?}, got {got:?}", driver.name);
             }
             // Beside them only what is extra by its documentation.
-            assert_eq!(got.len(), asked.len() + 2, "{}: {got:?}", driver.name);
+            assert_eq!(got.len(), asked.len() + 4, "{}: {got:?}", driver.name);
         });
     });
 }

@@ -2,6 +2,7 @@
 
 mod access;
 mod analytic;
+mod compact;
 mod cull;
 mod host;
 mod normals;

@@ -7,13 +7,14 @@ use crate::{
 };
 use glam::Vec3;
 use meniscus::{
-    shader::CLASS_BODY,
+    shader::{CLASS_BODY, DEPTH_ROUNDING, SILHOUETTE},
     targets::Id,
-    twin::{occlude::occlude, quadric::PAD},
+    twin::occlude::occlude,
 };
 
-/// Eye-space depths round three times (a row of the view, then the sum), each by 6e-8 of numbers a little larger.
-const ROUNDING: f64 = 5e-7;
+/// Depths round in particle radii: G by the ratio of the semi-axes (16 for S), a dozen operations of 6e-8 each, and the
+/// root of a discriminant more than that where it is small. The cull pass allows as much.
+const ROUNDING: f64 = DEPTH_ROUNDING as f64;
 
 /// Front and back bounds as the GPU has them.
 fn bounds(shot: &Shot) -> (Vec<f64>, Vec<f64>) {
@@ -22,23 +23,24 @@ fn bounds(shot: &Shot) -> (Vec<f64>, Vec<f64>) {
     (all[..half].to_vec(), all[half..].to_vec())
 }
 
-/// A pixel may differ only if its centre lies within 0.02 pixels of some square's edge: then squares that much larger,
-/// or that much smaller, agree with the GPU.
+/// A pixel may differ only if some ray there nearly grazes a particle: then one that leaves out none of these, or three
+/// times as many, agrees with the GPU.
 fn check(driver: &Driver, case: &Case, what: &str, bounded_at_least: f64) -> Shot {
     let shot = driver.shoot(case);
     let (front, back) = bounds(&shot);
     let body = packed(&case.particles, CLASS_BODY);
-    let [want, large, small] = [0.0, -0.02, 0.02].map(|more| occlude(&shot.frame, &body, PAD + more));
+    let [want, large, small] = [1.0, 0.0, 3.0].map(|share| occlude(&shot.frame, &body, share * f64::from(SILHOUETTE)));
+    let rounding = ROUNDING * f64::from(case.particles.radius);
     let (mut bounded, mut edges) = (0, 0);
     for i in 0..front.len() {
         let label = format!("{}: {what}: pixel {i}", driver.name);
         assert_eq!(front[i].is_finite(), back[i] > 0.0, "{label}: {} {}", front[i], back[i]);
-        let (low, high) = (large.front[i] * (1.0 - ROUNDING), small.front[i] * (1.0 + ROUNDING));
+        let (low, high) = (large.front[i] - rounding, small.front[i] + rounding);
         assert!((low..=high).contains(&front[i]), "{label}: front {}, should be {}", front[i], want.front[i]);
-        let (low, high) = (small.back[i] * (1.0 - ROUNDING), large.back[i] * (1.0 + ROUNDING));
+        let (low, high) = (small.back[i] - rounding, large.back[i] + rounding);
         assert!((low..=high).contains(&back[i]), "{label}: back {}, should be {}", back[i], want.back[i]);
         // Where the twin's three sizes agree, the ranges above are one value, rounded.
-        let same = |a: f64, b: f64| a == b || (a - b).abs() <= ROUNDING * b;
+        let same = |a: f64, b: f64| a == b || (a - b).abs() <= rounding;
         edges += usize::from(!same(front[i], want.front[i]) || !same(back[i], want.back[i]));
         bounded += usize::from(front[i].is_finite());
     }
@@ -51,8 +53,8 @@ fn check(driver: &Driver, case: &Case, what: &str, bounded_at_least: f64) -> Sho
     for i in (0..front.len()).filter(|i| front[*i].is_finite()) {
         let (nearest, farthest) = (f64::from(nearest[i].abs()), f64::from(farthest[i]));
         let label = format!("{}: {what}: pixel {i}", driver.name);
-        assert!(nearest > 0.0 && nearest <= front[i] * (1.0 + ROUNDING), "{label}: front {nearest} > {}", front[i]);
-        assert!(farthest >= back[i] * (1.0 - ROUNDING), "{label}: back {farthest} < {}", back[i]);
+        assert!(nearest > 0.0 && nearest <= front[i] + rounding, "{label}: front {nearest} > {}", front[i]);
+        assert!(farthest >= back[i] - rounding, "{label}: back {farthest} < {}", back[i]);
     }
     shot
 }
