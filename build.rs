@@ -10,6 +10,14 @@ mod shared;
 
 /// Rust constant, source file, macros it is compiled with.
 const SHADERS: &[(&str, &str, &[&str])] = &[
+    ("EXTENT_REDUCE_COMP", "extent.comp", &["REDUCE"]),
+    ("EXTENT_PLAN_COMP", "extent.comp", &["PLAN"]),
+    ("SORT_COUNT_COMP", "sort.comp", &["COUNT"]),
+    ("SORT_SCAN_COMP", "sort.comp", &["SCAN"]),
+    ("SORT_SCATTER_COMP", "sort.comp", &["SCATTER"]),
+    ("SORT_GATHER_COMP", "sort.comp", &["GATHER"]),
+    ("SHAPE_COMP", "shape.comp", &[]),
+    ("SHAPE_NEIGHBOURS_COMP", "shape.comp", &["NEIGHBOURS"]),
     ("OCCLUDE_COMP", "occlude.comp", &[]),
     ("CULL_COMP", "cull.comp", &[]),
     ("COMPACT_COUNT_COMP", "compact.comp", &["COUNT"]),

@@ -124,6 +124,8 @@ fn main() -> Result<()> {
                 eye_inside: false,
                 output: s.view,
                 debug: false,
+                positions: None,
+                neighbours: false,
             };
             renderer.record(s.cmd, &input)?;
             layout(&device, s, drawn, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);

@@ -15,11 +15,13 @@ pub enum Access {
     VertexRead,
     /// Sampled read in a fragment shader.
     FragmentRead,
+    /// Uniform block, in any shader.
+    UniformRead,
     /// Colour attachment.
     ColorAttachment,
     /// Depth attachment, tested and written.
     DepthAttachment,
-    /// Arguments of an indirect draw.
+    /// Arguments of an indirect draw or dispatch.
     IndirectRead,
     /// Source of a copy.
     TransferRead,
@@ -38,6 +40,11 @@ impl Access {
             }
             Access::VertexRead => (S::VERTEX_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL),
             Access::FragmentRead => (S::FRAGMENT_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL),
+            Access::UniformRead => (
+                S::from_raw(S::VERTEX_SHADER.as_raw() | S::FRAGMENT_SHADER.as_raw() | S::COMPUTE_SHADER.as_raw()),
+                A::UNIFORM_READ,
+                L::UNDEFINED,
+            ),
             Access::ColorAttachment => (
                 S::COLOR_ATTACHMENT_OUTPUT,
                 A::from_raw(A::COLOR_ATTACHMENT_READ.as_raw() | A::COLOR_ATTACHMENT_WRITE.as_raw()),

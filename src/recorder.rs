@@ -101,6 +101,8 @@ impl Table {
 #[derive(Clone, Copy)]
 pub(crate) struct Externals {
     pub frame_block: vk::Buffer,
+    /// Buffer, offset and range of the host's positions.
+    pub positions: (vk::Buffer, u64, u64),
     /// Centres and shapes, where the host prepared them.
     pub particles: [vk::Buffer; 3],
     pub environment: vk::ImageView,
@@ -136,6 +138,8 @@ pub(crate) struct Recorder<'a> {
     pub profiler: Option<&'a mut Profiler>,
     pub plan: &'a mut Vec<PlanEntry>,
     pub size: [u32; 2],
+    /// What has happened to the frame block since the host wrote it.
+    pub frame_block: State,
 }
 
 impl Recorder<'_> {
@@ -157,6 +161,9 @@ impl Recorder<'_> {
             p.begin(&self.host.device, self.cmd, name);
         }
         self.barriers(name, uses);
+        if !uses.iter().any(|u| u.id == Id::FrameBlock) {
+            self.barriers(name, &[used(Id::FrameBlock, Access::UniformRead)]);
+        }
         let result = body(self);
         if let Some(p) = &mut self.profiler {
             p.end(&self.host.device, self.cmd);
@@ -172,24 +179,20 @@ impl Recorder<'_> {
     pub fn barriers(&mut self, pass: &'static str, uses: &[Use]) {
         let (mut images, mut buffers) = (Vec::new(), Vec::new());
         for u in uses {
+            if u.id == Id::FrameBlock {
+                if let Some(barrier) = self.frame_block.step(u.access, false) {
+                    self.plan.push(PlanEntry { pass, resource: u.id.name(), barrier });
+                    buffers.push(on_buffer(&barrier, self.externals.frame_block));
+                }
+                continue;
+            }
             let Some(entry) = self.table.0.get_mut(&u.id) else { continue };
             let is_image = matches!(entry.resource, Resource::Image(_));
             let Some(barrier) = entry.state.step(u.access, is_image) else { continue };
             self.plan.push(PlanEntry { pass, resource: u.id.name(), barrier });
-            let (src, dst) = (barrier.src, barrier.dst);
             match &entry.resource {
                 Resource::Image(image) => images.push(barrier.on_image(image.handle, image.aspect)),
-                Resource::Buffer(buffer) => buffers.push(
-                    vk::BufferMemoryBarrier2::default()
-                        .src_stage_mask(src.0)
-                        .src_access_mask(src.1)
-                        .dst_stage_mask(dst.0)
-                        .dst_access_mask(dst.1)
-                        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                        .buffer(buffer.handle)
-                        .size(vk::WHOLE_SIZE),
-                ),
+                Resource::Buffer(buffer) => buffers.push(on_buffer(&barrier, buffer.handle)),
             }
         }
         if images.is_empty() && buffers.is_empty() {
@@ -220,8 +223,12 @@ impl Recorder<'_> {
                     image_infos.push((b, [vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)]));
                 }
                 Kind::UniformBuffer | Kind::StorageBuffer => {
-                    let buffer = self.buffer(u.id);
-                    buffer_infos.push((b, [vk::DescriptorBufferInfo::default().buffer(buffer).range(vk::WHOLE_SIZE)]));
+                    let (buffer, offset, range) = match u.id {
+                        Id::Positions => self.externals.positions,
+                        id => (self.buffer(id), 0, vk::WHOLE_SIZE),
+                    };
+                    let info = vk::DescriptorBufferInfo { buffer, offset, range };
+                    buffer_infos.push((b, [info]));
                 }
             }
         }
@@ -259,6 +266,12 @@ impl Recorder<'_> {
     pub fn dispatch(&mut self, x: u32, y: u32, z: u32) {
         // SAFETY: a compute pipeline and its set are bound.
         unsafe { self.host.device.cmd_dispatch(self.cmd, x, y, z) };
+    }
+
+    /// A dispatch whose group counts were written into a buffer.
+    pub fn dispatch_indirect(&mut self, arguments: Id, offset: u64) {
+        // SAFETY: a compute pipeline and its set are bound; the arguments were declared `IndirectRead`.
+        unsafe { self.host.device.cmd_dispatch_indirect(self.cmd, self.buffer(arguments), offset) };
     }
 
     /// Rendering into one layer of each colour target (or the host's output), all cleared to zero; `depth`: the
@@ -341,4 +354,17 @@ impl Recorder<'_> {
             _ => panic!("a pass asks for the image {:?}, which this frame does without", u.id),
         }
     }
+}
+
+/// The barrier for a whole buffer.
+fn on_buffer(barrier: &Barrier, buffer: vk::Buffer) -> vk::BufferMemoryBarrier2<'static> {
+    vk::BufferMemoryBarrier2::default()
+        .src_stage_mask(barrier.src.0)
+        .src_access_mask(barrier.src.1)
+        .dst_stage_mask(barrier.dst.0)
+        .dst_access_mask(barrier.dst.1)
+        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .buffer(buffer)
+        .size(vk::WHOLE_SIZE)
 }

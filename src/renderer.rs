@@ -7,13 +7,14 @@ use crate::{
     frame,
     particles::Particles,
     passes::Passes,
+    prepare::DevicePositions,
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder, Table, used},
     resources::{Buffer, Image, ImageSpec, Resource, Retired},
     settings::{Camera, Settings},
     shader,
     slot::Slot,
-    targets::{self, Id, LedgerEntry, Needs, Spec},
+    targets::{self, Id, LedgerEntry, Needs, Preparation, Spec},
 };
 use ash::vk;
 use glam::{Mat3, Vec3, Vec4};
@@ -43,6 +44,8 @@ pub struct FrameInput<'a> {
     pub camera: &'a Camera,
     /// Smoothing and optics.
     pub settings: &'a Settings,
+    /// Positions on the device, to be prepared in this frame and drawn instead of [`Renderer::set_particles`]'s.
+    pub positions: Option<DevicePositions>,
     /// Host's opaque scene, if there is one.
     pub scene: Option<SceneInput>,
     /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it.
@@ -52,6 +55,9 @@ pub struct FrameInput<'a> {
     pub output: vk::ImageView,
     /// Also write what each walk met into [`Id::Walk`] and [`Id::Direction`], for dumps and statistics.
     pub debug: bool,
+    /// Also list every particle's neighbours in [`Id::Neighbours`], where positions are prepared on the device: for each
+    /// its index, how many there are, and the indices of the first 1022. Four kibibytes a particle: for tests.
+    pub neighbours: bool,
 }
 
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
@@ -73,6 +79,8 @@ pub struct Renderer {
     scene: SceneBounds,
     environment: Option<Image>,
     plan: Vec<PlanEntry>,
+    /// The buffer that holds the last frame's classes, if that frame kept them.
+    last_classes: Option<vk::Buffer>,
 }
 
 /// What the renderer remembers of the particles it was given.
@@ -115,6 +123,7 @@ impl Renderer {
             scene: SceneBounds { radius: 1.0, splash: 0, body: 0, bounds: (Vec3::ZERO, Vec3::ZERO) },
             environment: None,
             plan: Vec::new(),
+            last_classes: None,
         };
         for _ in 0..renderer.host.frames_in_flight {
             match Slot::new(&renderer.host) {
@@ -167,6 +176,38 @@ impl Renderer {
         // Culling only saves time: where its bounds do not fit a storage buffer, everything is drawn.
         needs.occlusion &= 8 * u64::from(self.size[0]) * u64::from(self.size[1]) <= self.limits.storage_size;
         needs
+    }
+
+    /// What a frame needs that prepares positions on the device: both classes, since only the device will know whether
+    /// there are particles of each.
+    pub fn needs_on_device(
+        &self,
+        settings: &Settings,
+        positions: &DevicePositions,
+        debug: bool,
+        neighbours: bool,
+    ) -> Result<Needs, Error> {
+        let mut needs = self.needs(settings, debug);
+        needs.count = positions.count;
+        (needs.splash, needs.body) = (positions.count > 0, positions.count > 0);
+        needs.prepare = (positions.count > 0).then(|| Preparation {
+            entries: positions.entries(),
+            keep_classes: positions.keep_class_below.is_some(),
+            neighbours,
+        });
+        let largest = self.limits.storage_size;
+        let asked = BINDING_ALIGNMENT + positions.stride * u64::from(positions.count);
+        let buffers = Id::OWN.into_iter().filter_map(|id| match needs.spec(id)? {
+            Spec::Buffer { bytes, .. } => Some((id.name(), bytes)),
+            Spec::Image(_) => None,
+        });
+        for (name, bytes) in buffers.chain([(Id::Positions.name(), asked)]) {
+            if bytes > largest || positions.entries() > u64::from(u32::MAX) {
+                let remedy = format!("{name} would take {bytes} bytes; this device binds {largest} at most");
+                return Err(Error::parameter("particles", positions.count, remedy));
+            }
+        }
+        Ok(needs)
     }
 
     /// Gives the particles of the frames to come. The host's memory is copied; the last particles are kept until the
@@ -318,7 +359,22 @@ impl Renderer {
                 "no environment yet: call Renderer::set_environment first (Equirect::procedural_sky needs no file)",
             ));
         };
-        let needs = self.needs(input.settings, input.debug);
+        let mut needs = self.needs(input.settings, input.debug);
+        let mut bounds = self.scene.bounds;
+        let mut radius = self.scene.radius;
+        let mut prepare = None;
+        let mut positions = (vk::Buffer::null(), 0, 0);
+        if let Some(p) = &input.positions {
+            let begin = p.offset % BINDING_ALIGNMENT;
+            let constants = p.constants(begin)?;
+            needs = self.needs_on_device(input.settings, p, input.debug, input.neighbours)?;
+            // The device finds the box; what is written here never shows.
+            (bounds, radius) = ((Vec3::ZERO, Vec3::ZERO), p.radius);
+            if p.count > 0 {
+                positions = (p.buffer, p.offset - begin, begin + p.stride * u64::from(p.count - 1) + 12);
+                prepare = Some(constants);
+            }
+        }
         let Some(slot) = self.slots.get_mut(input.slot) else {
             return Err(Error::parameter("slot", input.slot, "use less than Host::frames_in_flight"));
         };
@@ -327,14 +383,23 @@ impl Renderer {
         self.frame += 1;
         self.table.fit(&self.host, &needs, &mut self.retired, self.frame)?;
         self.table.discard_contents();
+        let classes = match self.table.get(Id::LastClasses) {
+            Some(Resource::Buffer(b)) => Some(b.handle),
+            _ => None,
+        };
+        if let Some(p) = &mut prepare {
+            p.options.z = u32::from(classes.is_some() && classes == self.last_classes);
+        }
+        self.last_classes = classes;
 
-        let mut block = input.camera.uniforms(input.settings, self.size, self.scene.radius, self.scene.bounds);
+        let mut block = input.camera.uniforms(input.settings, self.size, radius, bounds);
         block.particles.x = needs.count;
         block.particles.z = self.limits.point_size as u32;
         block.particles.w = u32::from(input.settings.quads_only || self.limits.point_size <= 1.0);
         block.scene.w = f32::from(input.eye_inside);
         let mut externals = Externals {
             frame_block: slot.frame_block.handle,
+            positions,
             particles: self
                 .particles
                 .as_ref()
@@ -367,8 +432,9 @@ impl Renderer {
             profiler: slot.profiler.as_mut(),
             plan: &mut self.plan,
             size: self.size,
+            frame_block: access::State::default(),
         };
-        let recorded = frame::record(&mut recorder, &mut self.passes, &needs, input.settings);
+        let recorded = frame::record(&mut recorder, &mut self.passes, &needs, input.settings, prepare.as_ref());
         match &recorded {
             Ok(()) => slot.frame = self.frame,
             // The barriers recorded so far will never run: start again from new resources.
@@ -415,6 +481,7 @@ impl Renderer {
             table: &mut self.table,
             externals: Externals {
                 frame_block: vk::Buffer::null(),
+                positions: Default::default(),
                 particles: [vk::Buffer::null(); 3],
                 environment: vk::ImageView::null(),
                 scene_color: Default::default(),
@@ -425,6 +492,7 @@ impl Renderer {
             profiler: None,
             plan: &mut self.plan,
             size: self.size,
+            frame_block: access::State::default(),
         };
         recorder.barriers("copy", &[used(id, access::Access::TransferRead)]);
         match (self.table.get(id), self.table.spec(id)) {
@@ -468,6 +536,8 @@ impl Renderer {
     }
 }
 
+/// No device asks for more alignment of a storage buffer's offset.
+const BINDING_ALIGNMENT: u64 = 256;
 /// Three arrays of three floats each hold the particles (glsl/include/particles.glsl).
 const PARTICLE_ARRAYS: [Id; 3] = [Id::Centers, Id::Diagonals, Id::Mixed];
 const ARRAY_BYTES: u64 = 12;

@@ -199,11 +199,11 @@ impl Camera {
     }
 
     /// Largest |f| of an accepted hit, in particle radii, or
-    pub const ACCEPTED: f32 = 0.05;
+    pub const ACCEPTED: f32 = crate::shader::ACCEPTED;
     /// in what a pixel covers in the middle of the liquid, whichever is more.
-    pub const ACCEPTED_PIXELS: f32 = 0.1;
+    pub const ACCEPTED_PIXELS: f32 = crate::shader::ACCEPTED_PIXELS;
     /// Largest spread of the depths around a sample that is still interpolated, in particle radii, or
-    pub const JUMP: f32 = 2.0;
+    pub const JUMP: f32 = crate::shader::JUMP;
     /// in what a pixel covers in the middle of the liquid, whichever is more: a surface 80 degrees steep.
     pub const JUMP_PIXELS: f32 = crate::shader::STEEP;
 }

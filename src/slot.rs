@@ -13,19 +13,20 @@ pub(crate) struct Slot {
     pub frame: u64,
 }
 
-/// Descriptor sets of one frame: 20 iterations and a dozen others.
-const SETS: u32 = 64;
+/// Descriptor sets of one frame: 20 iterations of smoothing, 60 steps of the sort and two dozen others.
+const SETS: u32 = 128;
 
 impl Slot {
     pub fn new(host: &Host) -> Result<Slot, Error> {
         let size = |ty, count| vk::DescriptorPoolSize { ty, descriptor_count: count * SETS };
         let sizes = [
             size(vk::DescriptorType::UNIFORM_BUFFER, 1),
-            size(vk::DescriptorType::STORAGE_BUFFER, 6),
+            size(vk::DescriptorType::STORAGE_BUFFER, 8),
             size(vk::DescriptorType::SAMPLED_IMAGE, 8),
             size(vk::DescriptorType::STORAGE_IMAGE, 1),
         ];
-        let usage = vk::BufferUsageFlags::UNIFORM_BUFFER;
+        // The extent pass completes it where positions are prepared on the device.
+        let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
         let mut frame_block = Buffer::new(
             host,
             Id::FrameBlock.name(),

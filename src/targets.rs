@@ -8,6 +8,12 @@ use ash::vk::{self, BufferUsageFlags as B, Format as F, ImageUsageFlags as U};
 #[allow(missing_docs)] // each is described where it is made, in `spec`
 pub enum Id {
     FrameBlock,
+    Positions,
+    Extent,
+    Order,
+    Sorted,
+    LastClasses,
+    Neighbours,
     Centers,
     Diagonals,
     Mixed,
@@ -36,7 +42,15 @@ pub enum Id {
 
 impl Id {
     /// Those the renderer makes for itself from [`Needs`], in the order of the memory ledger.
-    pub const OWN: [Id; 17] = [
+    pub const OWN: [Id; 25] = [
+        Id::Extent,
+        Id::Order,
+        Id::Sorted,
+        Id::LastClasses,
+        Id::Neighbours,
+        Id::Centers,
+        Id::Diagonals,
+        Id::Mixed,
         Id::Bounds,
         Id::Visible,
         Id::Sums,
@@ -60,6 +74,12 @@ impl Id {
     pub fn name(self) -> &'static str {
         match self {
             Id::FrameBlock => "frame block",
+            Id::Positions => "positions (host's)",
+            Id::Extent => "extent",
+            Id::Order => "sort order",
+            Id::Sorted => "sorted positions",
+            Id::LastClasses => "last classes",
+            Id::Neighbours => "neighbours (debug)",
             Id::Centers => "particle centres",
             Id::Diagonals => "particle shapes (diagonal)",
             Id::Mixed => "particle shapes (mixed)",
@@ -107,6 +127,19 @@ pub struct Needs {
     pub occlusion: bool,
     /// Whether the refraction pass also writes what each walk met.
     pub debug: bool,
+    /// Preparation on the device, if the frame starts from positions there.
+    pub prepare: Option<Preparation>,
+}
+
+/// What the preparation on the device needs memory for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Preparation {
+    /// Entries of the sort: one a particle, or 27.
+    pub entries: u64,
+    /// Whether classes are kept from frame to frame.
+    pub keep_classes: bool,
+    /// Whether neighbours are listed, for tests: four kibibytes a particle.
+    pub neighbours: bool,
 }
 
 /// An image or a buffer, as it has to be made.
@@ -135,6 +168,7 @@ impl Needs {
             iterations: settings.iterations,
             occlusion: settings.occlusion_culling,
             debug,
+            prepare: None,
         }
     }
 
@@ -176,6 +210,8 @@ impl Needs {
     pub fn spec(&self, id: Id) -> Option<Spec> {
         let (splash, body, any) = (self.splash, self.body, self.count > 0);
         let count = u64::from(self.count);
+        let prepare = self.prepare.filter(|_| any);
+        let blocks = |items: u64| items.div_ceil(u64::from(shader::BLOCK));
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let image = |format, layers, array, usage| {
             Some(Spec::Image(ImageSpec { format, size: self.size, layers, array, usage }))
@@ -189,12 +225,24 @@ impl Needs {
         let placeholder =
             |format| Some(Spec::Image(ImageSpec { format, size: [1, 1], layers: 1, array: true, usage: U::SAMPLED }));
         match id {
+            Id::Extent if prepare.is_some() => buffer(4 * u64::from(shader::EXTENT_WORDS), B::INDIRECT_BUFFER),
+            // Indices, read from one half and written to the other.
+            Id::Order => prepare.and_then(|p| buffer(8 * p.entries, B::empty())),
+            Id::Sorted | Id::Centers | Id::Diagonals | Id::Mixed if prepare.is_some() => buffer(12 * count, B::empty()),
+            Id::LastClasses if prepare.is_some_and(|p| p.keep_classes) => buffer(4 * count, B::empty()),
+            Id::Neighbours if prepare.is_some_and(|p| p.neighbours) => {
+                buffer(4 * u64::from(shader::NEIGHBOUR_ROOM + 2) * count, B::empty())
+            }
             // Two 32-bit bounds a pixel: nearest and farthest depth that the body certainly reaches.
             Id::Bounds if body && self.occlusion => buffer(8 * pixels, B::empty()),
             // A word a particle: its class and the sides on which it shows.
             Id::Visible if any => buffer(4 * count, B::empty()),
-            // Counts of each block's particles in each list, and the lists' totals.
-            Id::Sums if any => buffer(16 * (count.div_ceil(u64::from(shader::BLOCK)) + 1), B::empty()),
+            // Counts of each block's particles in each list, and the lists' totals; before that, of the sort's entries
+            // for each digit.
+            Id::Sums if any => {
+                let sorting = self.prepare.map_or(0, |p| u64::from(shader::DIGITS) * (blocks(p.entries) + 1));
+                buffer(4 * sorting.max(4 * (blocks(count) + 1)), B::empty())
+            }
             // The lists: for each side splashes from the start, the body from the end.
             Id::Drawn if any => buffer(4 * u64::from(self.sides()) * count, B::empty()),
             Id::Draws if any => buffer(4 * size_of::<shader::Draws>() as u64, B::INDIRECT_BUFFER),

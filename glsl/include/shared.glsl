@@ -60,7 +60,41 @@
 #define COUNT_NORMAL_DEGENERATE 7
 #define COUNT_LARGE_SPLASH 8
 #define COUNT_LARGE_BODY 9
-#define COUNTERS 10
+// Of the preparation: classes, and how ellipsoids came about.
+#define COUNT_SPLASH 10
+#define COUNT_BODY 11
+#define COUNT_NOT_FINITE 12
+#define COUNT_FEW_NEIGHBOURS 13
+#define COUNT_DEGENERATE 14
+#define COUNT_CLAMPED_LONG 15
+#define COUNT_CLAMPED_RATIO 16
+#define COUNTERS 17
+
+// Words of the extent buffer: smallest and largest coordinates (as integers in the order of the floats), the occupied
+// cells (first, last), bits of each axis that a sort key needs, passes of the sort, and for each pass that there could
+// be the indirect dispatches of its blocks and of its rows.
+#define EXTENT_LEAST 0
+#define EXTENT_MOST 3
+#define EXTENT_FIRST_CELL 6
+#define EXTENT_LAST_CELL 9
+#define EXTENT_BITS 12
+#define EXTENT_PASSES 15
+#define EXTENT_DISPATCH 16
+#define EXTENT_WORDS 140
+
+// A sort pass orders by so many bits; keys of three 31-bit cell coordinates need so many passes at most.
+#define DIGIT_BITS 5
+#define DIGITS 32
+#define SORT_PASSES 20
+
+// Particles one invocation prepares in a row: neighbours in the sorted order share a cell, and its look-ups.
+#define SHAPE_RUN 8
+
+// Below this share of the filled body's variance neighbours lie on one spot: their spread says nothing about a shape.
+#define DEGENERATE_SHARE 0.05
+
+// Neighbours listed for each particle where they are asked for; before them its index and how many there are.
+#define NEIGHBOUR_ROOM 1022
 
 // Plane fitting: below this |n.v| eq. (5) is not trusted; an update longer than this many sigma is not taken.
 #define FIT_GRAZING_LIMIT 0.01
@@ -85,6 +119,12 @@
 
 // Tangent of the steepest surface (81 degrees against the view plane) for which strides are made short.
 #define STEEP 6.0
+
+// Largest |f| of an accepted hit, in particle radii and in what a pixel covers in the middle of the liquid, whichever is
+// more; largest spread of the depths around a sample that is still interpolated, in radii (in pixels: STEEP).
+#define ACCEPTED 0.05
+#define ACCEPTED_PIXELS 0.1
+#define JUMP 2.0
 
 // One particle, as drawn: eye-independent. In memory it is three arrays of three floats, with the class as a sign (see
 // particles.glsl).
@@ -115,7 +155,16 @@ struct Draws {
     uvec4 quads;
 };
 
-// Push constants of the particle passes.
+// Push constants of the preparation.
+struct Prepare {
+    uvec4 source;   // particles; where positions begin and how far apart they are, in words; entries a particle has in the sort
+    vec4 lengths;   // edge of a cell; particle radius r; support h; reach of the neighbours that shape ellipsoids, 2 h
+    vec4 classes;   // splash below this share of the filled body's density; last class kept below this one; sum of a filled body's weights; unused
+    vec4 shape;     // lambda; 1 / largest ratio of semi-axes; longest semi-axis and variance of a filled body in r and its square
+    uvec4 options;  // fewest neighbours; pass of the sort; 1 if last classes are there; cells to either side that hold neighbours
+};
+
+// Push constants of the splat pass.
 struct Splat {
     uvec4 what; // class, side, 2 unused
 };

@@ -3,6 +3,7 @@
 
 mod canvas;
 mod session;
+mod upload;
 mod validation;
 
 use crate::{Error, device};
@@ -14,6 +15,7 @@ use gpu_allocator::{
 };
 pub use session::Session;
 use std::sync::{Arc, Mutex};
+pub use upload::Upload;
 pub use validation::Messages;
 
 /// Why there is no host.

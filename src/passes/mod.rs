@@ -2,11 +2,14 @@
 
 pub(crate) mod compact;
 pub(crate) mod cull;
+pub(crate) mod extent;
 pub(crate) mod normals;
 pub(crate) mod occlude;
 pub(crate) mod plane_fit;
 pub(crate) mod refract;
 pub(crate) mod reset;
+pub(crate) mod shape;
+pub(crate) mod sort;
 pub(crate) mod splat;
 pub(crate) mod tiles;
 
@@ -25,6 +28,9 @@ use std::collections::HashMap;
 /// All passes, made once for a device and an output format.
 pub(crate) struct Passes {
     pub reset: reset::Reset,
+    pub extent: extent::Extent,
+    pub sort: sort::Sort,
+    pub shape: shape::Shape,
     pub occlude: occlude::Occlude,
     pub cull: cull::Cull,
     pub compact: compact::Compact,
@@ -39,6 +45,9 @@ impl Passes {
     pub fn new(limits: &Limits, output: vk::Format) -> Passes {
         Passes {
             reset: reset::Reset,
+            extent: extent::Extent::default(),
+            sort: sort::Sort::default(),
+            shape: shape::Shape::default(),
             occlude: occlude::Occlude::default(),
             cull: cull::Cull::default(),
             compact: compact::Compact::default(),
@@ -51,6 +60,9 @@ impl Passes {
     }
 
     pub fn destroy(&mut self, host: &Host) {
+        self.extent.pipelines.destroy(host);
+        self.sort.pipelines.destroy(host);
+        self.shape.pipelines.destroy(host);
         self.occlude.pipelines.destroy(host);
         self.cull.pipelines.destroy(host);
         self.compact.pipelines.destroy(host);

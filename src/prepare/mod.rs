@@ -1,9 +1,10 @@
 //! From simulated particles to what is drawn: spheres for splashes, ellipsoids for the body.
 //!
-//! All of it runs on the CPU, once for each frame of particles. The result depends on the set of
+//! This is the CPU's way, once for each frame of particles, and the twin of the GPU's ([`DevicePositions`]). The result depends on the set of
 //! particles alone: a shuffled input gives bit-identical output, on any number of threads.
 
 pub mod density;
+mod device;
 pub mod ellipsoids;
 pub mod neighbours;
 mod options;
@@ -14,6 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{Mat3, Vec3};
 
 pub use density::{DensityField, classify};
+pub use device::DevicePositions;
 pub use neighbours::Search;
 pub use options::Options;
 pub use spacing::estimate_radius;

@@ -4,6 +4,7 @@
 pub mod background;
 pub mod compact;
 pub mod cull;
+pub mod extent;
 pub mod normal;
 pub mod normals;
 pub mod occlude;
@@ -12,5 +13,7 @@ pub mod plane_fit;
 pub mod quadric;
 pub mod refract;
 pub mod search;
+pub mod shape;
+pub mod sort;
 pub mod splat;
 pub mod tiles;

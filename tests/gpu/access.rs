@@ -48,6 +48,8 @@ fn a_frame_has_a_barrier_before_every_read() {
             eye_inside: false,
             output: vk::ImageView::null(),
             debug: true,
+            positions: None,
+            neighbours: false,
         };
         let mut plans = Vec::new();
         for _ in 0..4 {

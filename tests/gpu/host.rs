@@ -50,6 +50,8 @@ fn input<'a>(case: &'a Case, slot: usize, output: vk::ImageView) -> FrameInput<'
         eye_inside: false,
         output,
         debug: false,
+        positions: None,
+        neighbours: false,
     }
 }
 

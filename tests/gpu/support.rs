@@ -3,7 +3,8 @@
 use glam::{Mat3, Vec3};
 use meniscus::{
     Camera, Ellipsoid, Equirect, FrameInput, Particles, Settings,
-    host::{Gpu, Instance, Session},
+    host::{Gpu, Instance, Session, Upload},
+    prepare::{self, DevicePositions},
     shader::Frame,
     targets::Id,
 };
@@ -17,6 +18,22 @@ pub struct Case {
     pub settings: Settings,
     pub size: [u32; 2],
     pub eye_inside: bool,
+}
+
+/// Positions to be prepared on the device.
+pub struct Cloud<'a> {
+    pub positions: &'a [Vec3],
+    pub options: prepare::Options,
+    pub keep_class_below: Option<f32>,
+    pub offset: usize,
+    pub stride: usize,
+}
+
+impl<'a> Cloud<'a> {
+    pub fn new(positions: &'a [Vec3], search: prepare::Search) -> Cloud<'a> {
+        let options = prepare::Options { search, ..Default::default() };
+        Cloud { positions, options, keep_class_below: None, offset: 0, stride: 12 }
+    }
 }
 
 /// What a frame left behind.
@@ -54,9 +71,35 @@ pub struct Driver<'a> {
 impl Driver<'_> {
     /// Renders a case (with `debug` targets) and reads everything back.
     pub fn shoot(&self, case: &Case) -> Shot {
+        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        self.shoot_frame(case, None)
+    }
+
+    /// The same for positions prepared on the device, with every neighbour listed; they begin at `offset` bytes of their
+    /// buffer and lie `stride` bytes apart. Of the case's particles only the radius counts.
+    pub fn shoot_cloud(&self, case: &Case, cloud: &Cloud) -> Shot {
+        let mut words = vec![f32::NAN; (cloud.offset + cloud.stride * cloud.positions.len()) / 4 + 3];
+        for (i, p) in cloud.positions.iter().enumerate() {
+            let at = (cloud.offset + i * cloud.stride) / 4;
+            words[at..at + 3].copy_from_slice(&p.to_array());
+        }
+        let gpu = self.session.borrow().gpu;
+        let upload = Upload::new(gpu, bytemuck::cast_slice(&words)).expect("upload");
+        let positions = DevicePositions {
+            buffer: upload.buffer,
+            offset: cloud.offset as u64,
+            stride: cloud.stride as u64,
+            count: cloud.positions.len() as u32,
+            radius: case.particles.radius,
+            options: cloud.options,
+            keep_class_below: cloud.keep_class_below,
+        };
+        self.shoot_frame(case, Some(positions))
+    }
+
+    fn shoot_frame(&self, case: &Case, positions: Option<DevicePositions>) -> Shot {
         let session = &mut *self.session.borrow_mut();
         session.resize(case.size).expect("size");
-        session.renderer.set_particles(&case.particles).expect("particles");
         let input = FrameInput {
             slot: 0,
             camera: &case.camera,
@@ -65,6 +108,8 @@ impl Driver<'_> {
             eye_inside: case.eye_inside,
             output: ash::vk::ImageView::null(),
             debug: true,
+            positions,
+            neighbours: positions.is_some(),
         };
         session.frame(&input).expect("frame");
         let mut targets = HashMap::new();

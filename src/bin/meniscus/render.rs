@@ -228,6 +228,8 @@ fn render(job: &Job, session: &mut Session) -> Result<(), Box<dyn std::error::Er
         eye_inside: job.eye_inside,
         output: ash::vk::ImageView::null(), // the session's canvas
         debug: false,
+        positions: None,
+        neighbours: false,
     };
     let mut times = session.frame(&input)?;
     if job.args.stats.is_some() {

@@ -1,0 +1,95 @@
+// The box of all positions, and what follows from it: the frame's bounds and search limits, the cells it occupies, how many
+// bits of them the sort has to look at, and so how many of its passes run. REDUCE runs over the particles, PLAN once.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.glsl"
+#include "groups.glsl"
+layout(local_size_x = PARTICLE_GROUP) in;
+#include "positions.glsl"
+layout(set = 0, binding = 0, std430) buffer FrameBlock { Frame frame; };
+layout(set = 0, binding = 3, std430) buffer CounterBlock { uint at[]; } counters;
+
+// Integers in the order of the floats.
+uint ordered(float x) {
+    uint u = floatBitsToUint(x);
+    return (u & 0x80000000u) != 0u ? ~u : u | 0x80000000u;
+}
+float unordered(uint u) { return uintBitsToFloat((u & 0x80000000u) != 0u ? u & 0x7fffffffu : ~u); }
+
+shared uint box[6];
+
+#ifdef REDUCE
+void main() {
+    if (gl_LocalInvocationIndex < 6u) box[gl_LocalInvocationIndex] = gl_LocalInvocationIndex < 3u ? 0xffffffffu : 0u;
+    barrier();
+    uint block = group_index(), count = prepare.source.x, lost = 0u;
+    uvec3 least = uvec3(0xffffffffu), most = uvec3(0u);
+    for (uint k = 0u; k < BLOCK / PARTICLE_GROUP; ++k) {
+        uint i = block * BLOCK + k * PARTICLE_GROUP + gl_LocalInvocationIndex;
+        if (i >= count) break;
+        vec3 x = position(i);
+        if (!finite(x)) {
+            ++lost;
+            continue;
+        }
+        uvec3 u = uvec3(ordered(x.x), ordered(x.y), ordered(x.z));
+        least = min(least, u);
+        most = max(most, u);
+    }
+    for (int a = 0; a < 3; ++a) {
+        atomicMin(box[a], least[a]);
+        atomicMax(box[3 + a], most[a]);
+    }
+    if (lost > 0u) atomicAdd(counters.at[COUNT_NOT_FINITE], lost);
+    barrier();
+    uint t = gl_LocalInvocationIndex;
+    if (t < 3u) atomicMin(extent.at[EXTENT_LEAST + t], box[t]);
+    else if (t < 6u) atomicMax(extent.at[EXTENT_LEAST + t], box[t]);
+}
+#else
+void main() {
+    if (gl_GlobalInvocationID.x != 0u) return;
+    vec3 low = vec3(0.0), high = vec3(0.0);
+    if (extent.at[EXTENT_LEAST] <= extent.at[EXTENT_MOST]) {
+        low = vec3(unordered(extent.at[0]), unordered(extent.at[1]), unordered(extent.at[2]));
+        high = vec3(unordered(extent.at[3]), unordered(extent.at[4]), unordered(extent.at[5]));
+    }
+    // The table enters particles into the cells around theirs, too.
+    uint entries = prepare.source.w;
+    int more = entries == 1u ? 0 : 1;
+    uint bits = 0u;
+    for (int a = 0; a < 3; ++a) {
+        int first = cell_of(low[a], prepare.lengths.x) - more, last = cell_of(high[a], prepare.lengths.x) + more;
+        extent.at[EXTENT_FIRST_CELL + a] = uint(first);
+        extent.at[EXTENT_LAST_CELL + a] = uint(last - more);
+        uint axis = uint(findMSB(uint(last - first)) + 1);
+        extent.at[EXTENT_BITS + a] = axis;
+        bits += axis;
+    }
+    uint passes = (bits + DIGIT_BITS - 1u) / DIGIT_BITS;
+    extent.at[EXTENT_PASSES] = passes;
+    uint blocks = (prepare.source.x * entries + BLOCK - 1u) / BLOCK, rows = max((blocks + 65534u) / 65535u, 1u);
+    for (uint p = 0u; p < SORT_PASSES; ++p) {
+        uint at = EXTENT_DISPATCH + 6u * p, on = p < passes ? 1u : 0u;
+        extent.at[at] = on * ((blocks + rows - 1u) / rows);
+        extent.at[at + 1u] = rows;
+        extent.at[at + 2u] = 1u;
+        extent.at[at + 3u] = on * DIGITS;
+        extent.at[at + 4u] = 1u;
+        extent.at[at + 5u] = 1u;
+    }
+    // What Camera::uniforms makes of the same box, with room for ellipsoids around the outermost centres.
+    float radius = prepare.lengths.y;
+    vec3 room = vec3(max(prepare.shape.z, 1.0) * radius);
+    low -= room;
+    high += room;
+    float middle = length((frame.view * vec4(0.5 * (low + high), 1.0)).xyz);
+    float pixel = middle / max(abs(frame.to_pixel.x), abs(frame.to_pixel.y));
+    float converged = max(1e-3 * radius, 1e-6 * (middle + 0.5 * length(high - low)));
+    frame.search.x = converged;
+    frame.search.y = max(max(ACCEPTED * radius, ACCEPTED_PIXELS * pixel), converged);
+    frame.search.z = max(JUMP * radius, STEEP * pixel);
+    frame.bounds_min = vec4(low, 0.0);
+    frame.bounds_max = vec4(high, 0.0);
+}
+#endif

@@ -1,0 +1,61 @@
+// Positions as the caller's buffer holds them, and the whole cells they lie in (Im16 section III): unbounded, and exact.
+layout(set = 0, binding = 1, std430) readonly buffer PositionBlock { float at[]; } positions;
+layout(set = 0, binding = 2, std430) buffer ExtentBlock { uint at[]; } extent;
+layout(push_constant) uniform PushBlock { Prepare prepare; };
+
+const int FURTHEST_CELL = 1 << 29;
+
+vec3 position(uint i) {
+    uint at = prepare.source.y + i * prepare.source.z;
+    return vec3(positions.at[at], positions.at[at + 1u], positions.at[at + 2u]);
+}
+
+bool finite(vec3 x) { return !any(isnan(x)) && !any(isinf(x)); }
+
+// p + e = a b exactly (Dekker): what rounding leaves of a product.
+vec2 two_product(float a, float b) {
+    precise float p = a * b;
+    precise float sa = 4097.0 * a, ha = sa - (sa - a), la = a - ha;
+    precise float sb = 4097.0 * b, hb = sb - (sb - b), lb = b - hb;
+    precise float e = ((ha * hb - p) + ha * lb + la * hb) + la * lb;
+    return vec2(p, e);
+}
+
+// s + e = a + b exactly (Knuth).
+vec2 two_sum(float a, float b) {
+    precise float s = a + b, t = s - a;
+    precise float e = (a - (s - t)) + (b - t);
+    return vec2(s, e);
+}
+
+// floor(x / edge), exactly: a rounded quotient, mended by its exact remainder. Beyond 2^29 cells all is one cell.
+int cell_of(float x, float edge) {
+    float q = floor(x / edge);
+    if (!(abs(q) < float(FURTHEST_CELL))) return q < 0.0 ? -FURTHEST_CELL : FURTHEST_CELL;
+    vec2 p = two_product(q, edge);
+    precise float rest = (x - p.x) - p.y, above = (rest - edge);
+    int cell = int(q);
+    if (rest < 0.0) --cell;
+    else if (above >= 0.0) ++cell;
+    return cell;
+}
+
+ivec3 first_cell() { return ivec3(extent.at[EXTENT_FIRST_CELL], extent.at[EXTENT_FIRST_CELL + 1], extent.at[EXTENT_FIRST_CELL + 2]); }
+ivec3 last_cell() { return ivec3(extent.at[EXTENT_LAST_CELL], extent.at[EXTENT_LAST_CELL + 1], extent.at[EXTENT_LAST_CELL + 2]); }
+
+// A position's cell; one that is not finite counts as in the last cell, where the sort keeps it out of the way.
+ivec3 cell_of(vec3 x) {
+    if (!finite(x)) return last_cell();
+    return ivec3(cell_of(x.x, prepare.lengths.x), cell_of(x.y, prepare.lengths.x), cell_of(x.z, prepare.lengths.x));
+}
+
+// Which of the 27 cells around a particle's own an entry of the relation table stands for.
+ivec3 entry_offset(uint entry) {
+    uint k = entry % 27u;
+    return ivec3(k / 9u, k / 3u % 3u, k % 3u) - 1;
+}
+
+// The cell of sort entry e: a particle, or (relation table) a particle in one of 27 cells.
+ivec3 entry_cell(uint e) {
+    return prepare.source.w == 1u ? cell_of(position(e)) : cell_of(position(e / 27u)) + entry_offset(e);
+}

@@ -1,0 +1,224 @@
+// From neighbours to what is drawn: number density and class (Imai16 section 4.1), and for the body the ellipsoid of
+// YuTurk13. One invocation takes SHAPE_RUN particles that follow each other in the sorted order: where they share a cell,
+// they share its look-ups. Candidates are tested exactly, so that neighbours are the same set however they are found.
+//
+// Sorted cells: cells as wide as the support, so 5 x 5 runs of 5 cells. RELATION: one run of the relation table, whose
+// cells are as wide as the reach.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.glsl"
+#include "groups.glsl"
+layout(local_size_x = PARTICLE_GROUP) in;
+#include "positions.glsl"
+layout(set = 0, binding = 3, std430) readonly buffer OrderBlock { uint at[]; } order;
+layout(set = 0, binding = 4, std430) readonly buffer SortedBlock { float at[]; } sorted;
+layout(set = 0, binding = 5, std430) writeonly buffer CenterBlock { float at[]; } centers;
+layout(set = 0, binding = 6, std430) writeonly buffer DiagonalBlock { float at[]; } diagonals;
+layout(set = 0, binding = 7, std430) writeonly buffer MixedBlock { float at[]; } mixed_parts;
+layout(set = 0, binding = 8, std430) buffer CounterBlock { uint at[]; } counters;
+layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_classes; // 0 splash, 1 body, by input index
+#ifdef NEIGHBOURS
+layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[]; } neighbours;
+#endif
+layout(constant_id = 0) const bool RELATION = false;
+layout(constant_id = 1) const bool KEEP_CLASSES = false;
+
+uint count() { return prepare.source.x; }
+vec3 sorted_position(uint k) { return vec3(sorted.at[3u * k], sorted.at[3u * k + 1u], sorted.at[3u * k + 2u]); }
+uint order_at(uint place) {
+    uint passes = extent.at[EXTENT_PASSES], entries = count() * prepare.source.w;
+    return passes == 0u ? place : order.at[(passes & 1u) * entries + place];
+}
+uint input_index(uint k) { return RELATION ? k : order_at(k); }
+
+ivec3 place_cell(uint place) {
+    if (!RELATION) return cell_of(sorted_position(place));
+    uint entry = order_at(place);
+    return cell_of(sorted_position(entry / 27u)) + entry_offset(entry);
+}
+
+bool before(ivec3 a, ivec3 b) { return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z; }
+
+// First place whose cell is not before c (`inclusive`: not before or equal to).
+uint search(ivec3 c, bool inclusive, uint low) {
+    uint high = count() * prepare.source.w;
+    while (low < high) {
+        uint middle = low + (high - low) / 2u;
+        ivec3 m = place_cell(middle);
+        if (before(m, c) || (inclusive && m == c)) low = middle + 1u;
+        else high = middle;
+    }
+    return low;
+}
+
+// Whether the offset o = b - a, rounded, is shorter than the reach; a tie of float32 is decided from a and b themselves, to
+// 2^-45 of the square.
+bool nearer(vec3 a, vec3 b, vec3 o, float squared) {
+    float reach = prepare.lengths.w;
+    precise float limit = reach * reach;
+    if (abs(squared - limit) > 4e-6 * limit) return squared < limit;
+    vec2 x = two_sum(b.x, -a.x), y = two_sum(b.y, -a.y), z = two_sum(b.z, -a.z);
+    vec2 xx = two_product(x.x, x.x), yy = two_product(y.x, y.x), zz = two_product(z.x, z.x), rr = two_product(reach, reach);
+    vec2 s = two_sum(xx.x, yy.x), t = two_sum(s.x, zz.x);
+    precise float large = t.x - rr.x;
+    precise float small = (s.y + t.y) + (xx.y + yy.y + zz.y - rr.y) + 2.0 * (x.x * x.y + y.x * y.y + z.x * z.y);
+    return large + small < 0.0;
+}
+
+float spline(float q) { return q < 0.5 ? 1.0 - 6.0 * q * q * (1.0 - q) : q < 1.0 ? 2.0 * (1.0 - q) * (1.0 - q) * (1.0 - q) : 0.0; }
+
+// Eigenvalues and eigenvectors (columns) of a symmetric matrix, in no order: cyclic Jacobi rotations.
+void eigen(inout mat3 a, out mat3 v) {
+    v = mat3(1.0);
+    for (int sweep = 0; sweep < 6; ++sweep) {
+        for (int k = 0; k < 3; ++k) {
+            int p = k == 2 ? 1 : 0, q = k == 0 ? 1 : 2, r = 3 - p - q;
+            float apq = a[p][q];
+            if (apq == 0.0) continue;
+            float theta = (a[q][q] - a[p][p]) / (2.0 * apq);
+            float t = abs(theta) > 1e18 ? 0.0 : (theta < 0.0 ? -1.0 : 1.0) / (abs(theta) + sqrt(theta * theta + 1.0));
+            float c = inversesqrt(t * t + 1.0), s = t * c;
+            a[p][p] -= t * apq;
+            a[q][q] += t * apq;
+            a[p][q] = a[q][p] = 0.0;
+            float rp = a[r][p], rq = a[r][q];
+            a[r][p] = a[p][r] = c * rp - s * rq;
+            a[r][q] = a[q][r] = s * rp + c * rq;
+            vec3 vp = v[p], vq = v[q];
+            v[p] = c * vp - s * vq;
+            v[q] = s * vp + c * vq;
+        }
+    }
+}
+
+// What is summed over the neighbours of one particle, offsets measured from it.
+struct Sums {
+    uint number;
+    float density;
+    float weight;
+    vec3 first;
+    vec3 diagonal;
+    vec3 mixed_part;
+};
+
+void add(inout Sums s, vec3 o, float squared) {
+    float d = sqrt(squared), q = d / prepare.lengths.w, w = 1.0 - q * q * q;
+    s.number += 1u;
+    s.density += spline(d / prepare.lengths.z);
+    s.weight += w;
+    s.first += w * o;
+    s.diagonal += w * o * o;
+    s.mixed_part += w * o.xxy * o.yzz;
+}
+
+void write(uint k, vec3 center, vec3 diagonal, vec3 mixed_part) {
+    for (uint a = 0u; a < 3u; ++a) {
+        centers.at[3u * k + a] = center[a];
+        diagonals.at[3u * k + a] = diagonal[a];
+        mixed_parts.at[3u * k + a] = mixed_part[a];
+    }
+}
+
+const uint LARGEST_RUNS = 25u;
+uint tally[COUNTERS - COUNT_SPLASH];
+void note(uint what) { ++tally[what - COUNT_SPLASH]; }
+
+// Class and ellipsoid of a particle from its sums.
+void finish(uint k, vec3 x, Sums s) {
+    float radius = prepare.lengths.y;
+    float relative = s.density / prepare.classes.z;
+    bool body = relative >= prepare.classes.x;
+    if (KEEP_CLASSES) {
+        uint i = input_index(k);
+        if (prepare.options.z != 0u && body && relative < prepare.classes.y) body = last_classes.at[i] == 1u;
+        last_classes.at[i] = body ? 1u : 0u;
+    }
+    if (!body) {
+        note(COUNT_SPLASH);
+        write(k, x, vec3(-1.0, 1.0, 1.0), vec3(0.0));
+        return;
+    }
+    note(COUNT_BODY);
+    if (s.number <= prepare.options.x + 1u) {
+        note(COUNT_FEW_NEIGHBOURS);
+        write(k, x, vec3(1.0), vec3(0.0));
+        return;
+    }
+    vec3 mean = s.first / s.weight, d = s.diagonal / s.weight - mean * mean;
+    vec3 m = s.mixed_part / s.weight - mean.xxy * mean.yzz;
+    // In radii, so that squares of lengths neither vanish nor overflow.
+    float unit = 1.0 / (radius * radius);
+    mat3 a = unit * mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z), v;
+    eigen(a, v);
+    vec3 variance = vec3(a[0][0], a[1][1], a[2][2]);
+    float most = max(variance.x, max(variance.y, variance.z)), least = most * prepare.shape.y;
+    if (most < DEGENERATE_SHARE * prepare.shape.w) {
+        note(COUNT_DEGENERATE);
+        write(k, x, vec3(1.0), vec3(0.0));
+        return;
+    }
+    if (min(variance.x, min(variance.y, variance.z)) < least) note(COUNT_CLAMPED_RATIO);
+    vec3 wanted = max(variance, vec3(least)) / prepare.shape.w;
+    if (most / prepare.shape.w > prepare.shape.z) note(COUNT_CLAMPED_LONG);
+    vec3 axes = min(wanted, vec3(prepare.shape.z)), l = axes * axes;
+    // S = V diag(l) V^T
+    vec3 r0 = vec3(v[0].x, v[1].x, v[2].x), r1 = vec3(v[0].y, v[1].y, v[2].y), r2 = vec3(v[0].z, v[1].z, v[2].z);
+    write(k, x + prepare.shape.x * mean, vec3(dot(r0 * r0, l), dot(r1 * r1, l), dot(r2 * r2, l)),
+          vec3(dot(r0 * r1, l), dot(r0 * r2, l), dot(r1 * r2, l)));
+}
+
+void main() {
+    for (uint c = 0u; c < COUNTERS - COUNT_SPLASH; ++c) tally[c] = 0u;
+    uint from = min(invocation() * SHAPE_RUN, count()), to = min(from + SHAPE_RUN, count());
+    ivec3 cell = ivec3(0);
+    uvec2 runs[LARGEST_RUNS];
+    uint number = 0u;
+    for (uint k = from; k < to; ++k) {
+        vec3 x = sorted_position(k);
+        if (!finite(x)) {
+            write(k, vec3(0.0), vec3(0.0), vec3(0.0));
+            continue;
+        }
+        ivec3 own = cell_of(x);
+        if (number == 0u || own != cell) {
+            cell = own;
+            number = 0u;
+            if (RELATION) {
+                uint begin = search(cell, false, 0u);
+                runs[number++] = uvec2(begin, search(cell, true, begin));
+            } else {
+                int around = int(prepare.options.w);
+                uint begin = 0u;
+                for (int i = -around; i <= around; ++i) {
+                    for (int j = -around; j <= around; ++j) {
+                        begin = search(cell + ivec3(i, j, -around), false, begin);
+                        uint end = search(cell + ivec3(i, j, around), true, begin);
+                        if (end > begin) runs[number++] = uvec2(begin, end);
+                    }
+                }
+            }
+        }
+        Sums s = Sums(0u, 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0));
+        for (uint run = 0u; run < number; ++run) {
+            for (uint j = runs[run].x; j < runs[run].y; ++j) {
+                uint other = RELATION ? order_at(j) / 27u : j;
+                vec3 y = sorted_position(other), o = y - x;
+                float squared = dot(o, o);
+                if (nearer(x, y, o, squared)) {
+#ifdef NEIGHBOURS
+                    if (s.number < NEIGHBOUR_ROOM) neighbours.at[k * (NEIGHBOUR_ROOM + 2u) + 2u + s.number] = input_index(other);
+#endif
+                    add(s, o, squared);
+                }
+            }
+        }
+#ifdef NEIGHBOURS
+        neighbours.at[k * (NEIGHBOUR_ROOM + 2u)] = input_index(k);
+        neighbours.at[k * (NEIGHBOUR_ROOM + 2u) + 1u] = s.number;
+#endif
+        finish(k, x, s);
+    }
+    for (uint c = 0u; c < COUNTERS - COUNT_SPLASH; ++c) {
+        if (tally[c] > 0u) atomicAdd(counters.at[COUNT_SPLASH + c], tally[c]);
+    }
+}

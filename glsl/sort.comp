@@ -1,0 +1,101 @@
+// Stable radix sort of particles (or of relation table entries) by the cell they lie in, lexicographically: x, then y,
+// then z. A pass sorts by DIGIT_BITS of the key: COUNT (each block's entries of each digit), SCAN (where they go),
+// SCATTER. Only the passes that the occupied cells need are dispatched (extent). Keys are made anew from positions, so
+// that only indices move; entries of the same cell stay in the order of the input. GATHER then copies the positions into
+// that order.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.glsl"
+#include "groups.glsl"
+layout(local_size_x = PARTICLE_GROUP) in;
+#include "positions.glsl"
+layout(set = 0, binding = 3, std430) buffer OrderBlock { uint at[]; } order; // two halves, read and written in turns
+layout(set = 0, binding = 4, std430) buffer SumBlock { uint at[]; } sums;
+layout(set = 0, binding = 5, std430) buffer SortedBlock { float at[]; } sorted;
+#include "prefix.glsl"
+
+const uint ITEMS = BLOCK / PARTICLE_GROUP;
+
+uint entries() { return prepare.source.x * prepare.source.w; }
+uint blocks() { return (entries() + BLOCK - 1u) / BLOCK; }
+
+// The entry at a place before this pass; the first pass finds the input's order.
+uint entry_at(uint place, uint pass) { return pass == 0u ? place : order.at[(pass & 1u) * entries() + place]; }
+
+// Adds an axis's bits to a key of three words.
+void append(inout uvec3 key, inout uint length, uint value, uint bits) {
+    uint word = length >> 5, shift = length & 31u;
+    if (bits > 0u) {
+        key[word] |= value << shift;
+        if (shift > 0u && word < 2u) key[word + 1u] |= value >> (32u - shift);
+    }
+    length += bits;
+}
+
+uint digit_of(uint entry) {
+    ivec3 first = first_cell();
+    uvec3 cell = uvec3(entry_cell(entry) - first), key = uvec3(0u);
+    uint length = 0u;
+    append(key, length, cell.z, extent.at[EXTENT_BITS + 2]);
+    append(key, length, cell.y, extent.at[EXTENT_BITS + 1]);
+    append(key, length, cell.x, extent.at[EXTENT_BITS]);
+    uint from = prepare.options.y * DIGIT_BITS, word = from >> 5, shift = from & 31u;
+    uint bits = key[word] >> shift;
+    if (shift > 32u - DIGIT_BITS && word < 2u) bits |= key[word + 1u] << (32u - shift);
+    return bits & (DIGITS - 1u);
+}
+
+#if defined(COUNT) || defined(SCATTER)
+shared uint counts[DIGITS * PARTICLE_GROUP]; // by digit, then thread
+#endif
+
+void main() {
+#ifdef SCAN
+    scan_row(gl_WorkGroupID.x, blocks(), DIGITS);
+#elif defined(GATHER)
+    uint k = invocation();
+    if (k >= prepare.source.x) return;
+    // The relation table is looked up from particles in the order of the input.
+    uint i = prepare.source.w == 1u ? entry_at(k, extent.at[EXTENT_PASSES]) : k;
+    vec3 x = position(i);
+    sorted.at[3u * k] = x.x;
+    sorted.at[3u * k + 1u] = x.y;
+    sorted.at[3u * k + 2u] = x.z;
+#else
+    uint block = group_index(), t = gl_LocalInvocationIndex, pass = prepare.options.y;
+    if (block >= blocks()) return;
+    for (uint d = 0u; d < DIGITS; ++d) counts[d * PARTICLE_GROUP + t] = 0u;
+    uint from = min(block * BLOCK + t * ITEMS, entries()), to = min(from + ITEMS, entries());
+    uint digits[ITEMS];
+    for (uint i = from; i < to; ++i) {
+        uint d = digit_of(entry_at(i, pass));
+        digits[i - from] = d;
+        ++counts[d * PARTICLE_GROUP + t];
+    }
+    barrier();
+#ifdef COUNT
+    if (t < DIGITS) {
+        uint sum = 0u;
+        for (uint k = 0u; k < PARTICLE_GROUP; ++k) sum += counts[t * PARTICLE_GROUP + k];
+        sums.at[t * blocks() + block] = sum;
+    }
+#else
+    // Where each thread's entries of each digit go: after all smaller digits, earlier blocks and earlier threads.
+    uint total, base = group_prefix(t < DIGITS ? sums.at[DIGITS * blocks() + t] : 0u, total);
+    if (t < DIGITS) {
+        base += sums.at[t * blocks() + block];
+        for (uint k = 0u; k < PARTICLE_GROUP; ++k) {
+            uint count = counts[t * PARTICLE_GROUP + k];
+            counts[t * PARTICLE_GROUP + k] = base;
+            base += count;
+        }
+    }
+    barrier();
+    uint half_at = ((pass + 1u) & 1u) * entries();
+    for (uint i = from; i < to; ++i) {
+        uint entry = entry_at(i, pass);
+        order.at[half_at + counts[digits[i - from] * PARTICLE_GROUP + t]++] = entry;
+    }
+#endif
+#endif
+}

@@ -1,0 +1,88 @@
+//! Preparation on the device: positions in a buffer of the host's, and the constants that its passes take.
+
+use super::{Options, PrepareError, Search, density::rest_density, ellipsoids::lattice_variance, options::Scale};
+use crate::{Error, shader::Prepare};
+use ash::vk;
+use glam::{UVec4, Vec4};
+
+/// Positions in device memory, to be prepared within the frame that draws them: neighbours, classes and ellipsoids as
+/// [`super::prepare`] makes them, but on the GPU, and with no word about them to the host.
+#[derive(Clone, Copy, Debug)]
+pub struct DevicePositions {
+    /// The host's buffer, with usage `STORAGE_BUFFER`: three 32-bit floats a particle, in world units. A position that is
+    /// not finite is left out.
+    pub buffer: vk::Buffer,
+    /// Where the first one begins, in bytes; a multiple of 4.
+    pub offset: u64,
+    /// Bytes from one to the next; a multiple of 4, at least 12.
+    pub stride: u64,
+    /// How many there are.
+    pub count: u32,
+    /// Particle radius in world units.
+    pub radius: f32,
+    /// What can be chosen.
+    pub options: Options,
+    /// Hysteresis against popping: a particle (the same index in the buffer) keeps the class that the last frame gave it
+    /// while its density lies between [`Options::splash_threshold`] and this share of a filled body's.
+    pub keep_class_below: Option<f32>,
+}
+
+impl DevicePositions {
+    /// Entries a particle has in the sort, and the edge of a cell in supports.
+    fn layout(&self) -> (u32, f64) {
+        match self.options.search {
+            Search::Runs => (1, 1.0),
+            Search::Relation => (27, 2.0),
+        }
+    }
+
+    /// Entries of the sort.
+    pub fn entries(&self) -> u64 {
+        u64::from(self.count) * u64::from(self.layout().0)
+    }
+
+    /// Checks radius, options, offset and stride, and makes the passes' constants; `begin` is what is left of the offset
+    /// when it was rounded down to what the device can bind.
+    pub(crate) fn constants(&self, begin: u64) -> Result<Prepare, Error> {
+        let scale = Scale::new(self.radius, &self.options)?;
+        if !self.offset.is_multiple_of(4) {
+            return Err(Error::parameter("offset of positions", self.offset, "use a multiple of 4 bytes"));
+        }
+        if !self.stride.is_multiple_of(4) || self.stride < 12 || self.stride > 1 << 20 {
+            let remedy = "use a multiple of 4 bytes, 12 at least and a mebibyte at most";
+            return Err(Error::parameter("stride of positions", self.stride, remedy));
+        }
+        if self.keep_class_below.is_some_and(f32::is_nan) {
+            return Err(Error::parameter("upper splash threshold", f32::NAN, "use a number"));
+        }
+        let (entries, supports) = self.layout();
+        let cell = (scale.support * supports) as f32;
+        let o = &self.options;
+        let relative = scale.support / scale.radius;
+        let upper = self.keep_class_below.unwrap_or(o.splash_threshold);
+        Ok(Prepare {
+            source: UVec4::new(self.count, (begin / 4) as u32, (self.stride / 4) as u32, entries),
+            lengths: Vec4::new(cell, self.radius, scale.support as f32, scale.reach() as f32),
+            classes: Vec4::new(o.splash_threshold, upper, rest_density(relative) as f32, 0.0),
+            shape: Vec4::new(
+                o.smoothing,
+                o.max_ratio.recip(),
+                o.max_semi_axis,
+                lattice_variance(scale.reach() / scale.radius) as f32,
+            ),
+            options: UVec4::new(u32::try_from(o.min_neighbours).unwrap_or(u32::MAX - 1), 0, 0, (2.0 / supports) as u32),
+        })
+    }
+}
+
+impl From<PrepareError> for Error {
+    fn from(e: PrepareError) -> Error {
+        match e {
+            PrepareError::Radius(r) => {
+                Error::parameter("particle radius", r, "give half the rest spacing, in world units")
+            }
+            PrepareError::Option { name, value, must } => Error::parameter(name, value, format!("it must be {must}")),
+            other => Error::parameter("particles", "", other.to_string()),
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! The box of all positions and what follows from it, against the twin.
+
+use crate::support::{Cloud, each_driver};
+use glam::Vec3;
+use meniscus::{
+    prepare::Search,
+    shader::{COUNT_NOT_FINITE, EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_PASSES},
+    targets::Id,
+    twin::extent::extent,
+};
+
+#[test]
+fn boxes_cells_and_bits_are_the_twins() {
+    each_driver(|driver| {
+        for (name, radius, mut positions) in crate::shape::clouds() {
+            for lost in [0, 3] {
+                // Positions that are not finite count for nothing.
+                positions.extend([Vec3::NAN, Vec3::INFINITY, Vec3::new(0.0, f32::NEG_INFINITY, 0.0)].iter().take(lost));
+                for (search, edge, more) in [(Search::Runs, 4.0, 0), (Search::Relation, 8.0, 1)] {
+                    let want = extent(&positions, edge * radius, more);
+                    let shot = driver.shoot_cloud(&crate::shape::empty(radius), &Cloud::new(&positions, search));
+                    let words = shot.words(Id::Extent, 0).expect("extent");
+                    let three = |at: u32| <[u32; 3]>::try_from(&words[at as usize..][..3]).expect("three words");
+                    let label = format!("{}: {name}: {search:?}, {lost} lost", driver.name);
+                    let cells = (three(EXTENT_FIRST_CELL), three(EXTENT_LAST_CELL));
+                    assert_eq!((cells.0.map(|c| c as i32), cells.1.map(|c| c as i32)), want.cells, "{label}");
+                    assert_eq!(three(EXTENT_BITS), want.bits, "{label}");
+                    assert_eq!(words[EXTENT_PASSES as usize], want.bits.iter().sum::<u32>().div_ceil(5), "{label}");
+                    assert_eq!(shot.counter(COUNT_NOT_FINITE), want.lost, "{label}");
+                }
+            }
+        }
+    });
+}
