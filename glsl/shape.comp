@@ -65,7 +65,11 @@ bool nearer(vec3 a, vec3 b, vec3 o, float squared) {
     return large + small < 0.0;
 }
 
-float spline(float q) { return q < 0.5 ? 1.0 - 6.0 * q * q * (1.0 - q) : q < 1.0 ? 2.0 * (1.0 - q) * (1.0 - q) * (1.0 - q) : 0.0; }
+// The cubic spline without a branch: 2 (1 - q)^3 less 8 (1/2 - q)^3 where those are positive.
+float spline(float q) {
+    float far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
+    return 2.0 * far * far * far - 8.0 * near * near * near;
+}
 
 // Eigenvalues and eigenvectors (columns) of a symmetric matrix, in no order: cyclic Jacobi rotations.
 void eigen(inout mat3 a, out mat3 v) {
@@ -102,9 +106,9 @@ struct Sums {
 };
 
 void add(inout Sums s, vec3 o, float squared) {
-    float d = sqrt(squared), q = d / prepare.lengths.w, w = 1.0 - q * q * q;
+    float d = sqrt(squared), q = d * (1.0 / prepare.lengths.w), w = 1.0 - q * q * q;
     s.number += 1u;
-    s.density += spline(d / prepare.lengths.z);
+    s.density += spline(d * (1.0 / prepare.lengths.z));
     s.weight += w;
     s.first += w * o;
     s.diagonal += w * o * o;
@@ -199,18 +203,24 @@ void main() {
             }
         }
         Sums s = Sums(0u, 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0));
-        for (uint run = 0u; run < number; ++run) {
-            for (uint j = runs[run].x; j < runs[run].y; ++j) {
-                uint other = RELATION ? order_at(j) / 27u : j;
-                vec3 y = sorted_position(other), o = y - x;
-                float squared = dot(o, o);
-                if (nearer(x, y, o, squared)) {
-#ifdef NEIGHBOURS
-                    if (s.number < NEIGHBOUR_ROOM) neighbours.at[k * (NEIGHBOUR_ROOM + 2u) + 2u + s.number] = input_index(other);
-#endif
-                    add(s, o, squared);
-                }
+        // One loop over all runs: invocations whose runs differ in length stay together.
+        uint run = 0u, j = runs[0].x, end = runs[0].y;
+        while (true) {
+            if (j == end) {
+                if (++run == number) break;
+                j = runs[run].x;
+                end = runs[run].y;
             }
+            uint other = RELATION ? order_at(j) / 27u : j;
+            vec3 y = sorted_position(other), o = y - x;
+            float squared = dot(o, o);
+            if (nearer(x, y, o, squared)) {
+#ifdef NEIGHBOURS
+                if (s.number < NEIGHBOUR_ROOM) neighbours.at[k * (NEIGHBOUR_ROOM + 2u) + 2u + s.number] = input_index(other);
+#endif
+                add(s, o, squared);
+            }
+            ++j;
         }
 #ifdef NEIGHBOURS
         neighbours.at[k * (NEIGHBOUR_ROOM + 2u)] = input_index(k);

@@ -94,7 +94,7 @@ fn npy<T: npyz::AutoSerialize>(shape: &[u64], data: impl Iterator<Item = T>) -> 
 }
 
 fn particles(path: &Path, job: &Job) -> Result<()> {
-    let (p, origin) = (&job.scene.particles, job.scene.origin);
+    let (p, origin) = (&job.particles, job.scene.origin);
     let n = p.ellipsoids.len() as u64;
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut npz = npyz::npz::NpzWriter::new(&mut bytes);

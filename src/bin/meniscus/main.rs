@@ -4,6 +4,7 @@ mod camera;
 mod codes;
 mod dump;
 mod info;
+mod prepared;
 mod render;
 mod scene;
 mod stats;

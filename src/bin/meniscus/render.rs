@@ -2,16 +2,17 @@
 
 use crate::{
     camera::{self, View},
-    dump,
-    scene::{Scene, Source, spinner},
+    dump, prepared,
+    scene::{Prepare, Scene, Source, spinner},
     stats,
 };
 use clap::ValueEnum;
 use glam::{DVec3, Vec3};
 use meniscus::{
-    Camera, Equirect, Error, FrameInput, Fresnel, Settings, Weighting,
-    host::{Gpu, Instance, Session},
+    Camera, Equirect, Error, FrameInput, Fresnel, Particles, Settings, Weighting,
+    host::{Gpu, Instance, Session, Upload},
     io::images,
+    prepare::Report,
 };
 use std::{path::PathBuf, process::ExitCode};
 
@@ -82,6 +83,9 @@ pub struct Args {
     /// Device whose name or driver contains this; the best one if not given
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
+    /// Where classes and ellipsoids are made
+    #[arg(long, value_enum, default_value = "cpu")]
+    pub prepare: Prepare,
     /// Draw every particle, also those that others hide
     #[arg(long)]
     pub no_culling: bool,
@@ -126,6 +130,9 @@ fn parse_vector(s: &str) -> Result<DVec3, String> {
 pub struct Job<'a> {
     pub args: &'a Args,
     pub scene: &'a Scene,
+    /// As drawn.
+    pub particles: Particles,
+    pub report: Report,
     pub camera: Camera,
     pub eye: Vec3,
     pub settings: Settings,
@@ -147,14 +154,15 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
         radius: args.radius,
         splash_threshold: args.splash_threshold,
         drop_invalid: args.drop_invalid,
+        prepare: args.prepare,
     })?;
     announce(&scene, &device.name, &device.driver);
-    let job = plan(args, &scene)?;
+    let mut job = plan(args, &scene)?;
     {
         let gpu = Gpu::new(&instance, device)?;
         let mut session = Session::new(&gpu, job.size, &environment)?;
         let bar = spinner("rendering");
-        let done = render(&job, &mut session);
+        let done = render(&mut job, &mut session);
         bar.finish_and_clear();
         session.end();
         done?;
@@ -174,6 +182,14 @@ fn announce(scene: &Scene, device: &str, driver: &str) {
     }
     if scene.particles.ellipsoids.is_empty() {
         println!("particles: none; only the background is rendered");
+    } else if scene.report == Report::default() {
+        let p = &scene.particles;
+        println!(
+            "particles: {}, prepared on the device; radius {} ({})",
+            p.ellipsoids.len(),
+            p.radius,
+            scene.radius_source
+        );
     } else {
         let (r, p) = (&scene.report, &scene.particles);
         println!("particles: {} splash, {} body; radius {} ({})", r.splash, r.body, p.radius, scene.radius_source);
@@ -215,20 +231,36 @@ fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::er
     };
     settings.validate()?;
     let size = [times(args.size[0])?, times(args.size[1])?];
-    Ok(Job { args, scene, camera, eye, settings, size, eye_inside: scene.inside(eye) })
+    Ok(Job {
+        args,
+        scene,
+        particles: scene.particles.clone(),
+        report: scene.report,
+        camera,
+        eye,
+        settings,
+        size,
+        eye_inside: scene.inside(eye),
+    })
 }
 
-fn render(job: &Job, session: &mut Session) -> Result<(), Box<dyn std::error::Error>> {
-    session.renderer.set_particles(&job.scene.particles)?;
+fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error::Error>> {
+    let upload = if job.args.prepare.on_device() {
+        Some(Upload::new(session.gpu, bytemuck::cast_slice(&job.scene.positions))?)
+    } else {
+        session.renderer.set_particles(&job.particles)?;
+        None
+    };
+    let (camera, settings) = (job.camera, job.settings);
     let mut input = FrameInput {
         slot: 0,
-        camera: &job.camera,
-        settings: &job.settings,
+        camera: &camera,
+        settings: &settings,
         scene: None,
         eye_inside: job.eye_inside,
         output: ash::vk::ImageView::null(), // the session's canvas
         debug: false,
-        positions: None,
+        positions: upload.as_ref().map(|u| job.scene.on_device(u.buffer)),
         neighbours: false,
     };
     let mut times = session.frame(&input)?;
@@ -244,6 +276,9 @@ fn render(job: &Job, session: &mut Session) -> Result<(), Box<dyn std::error::Er
     let memory = session.renderer.memory();
     input.debug = true;
     session.frame(&input)?;
+    if job.args.prepare.on_device() {
+        (job.particles, job.report) = prepared::read(session, &job.scene.particles)?;
+    }
     if let Some(folder) = &job.args.dump {
         dump::write(folder, job, session)?;
     }

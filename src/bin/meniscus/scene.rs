@@ -3,9 +3,9 @@
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
-    Class, Particles,
+    Class, Ellipsoid, Particles,
     io::particles::{Invalid, check_finite, read},
-    prepare::{self, DensityField, Input, Options, Report},
+    prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
 };
 use std::{error::Error, io::Write, path::Path, time::Duration};
 
@@ -22,6 +22,9 @@ pub struct Scene {
     pub radius_source: &'static str,
     pub dropped: usize,
     pub prepare_ms: f64,
+    /// Centres, relative to the origin.
+    pub positions: Vec<Vec3>,
+    pub options: Options,
     density: Option<DensityField>,
 }
 
@@ -31,6 +34,24 @@ pub struct Source<'a> {
     pub radius: Option<f64>,
     pub splash_threshold: Option<f32>,
     pub drop_invalid: bool,
+    pub prepare: Prepare,
+}
+
+/// Where classes and ellipsoids are made.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
+pub enum Prepare {
+    /// On the CPU, before the frame.
+    Cpu,
+    /// On the device, in every frame; neighbours by sorted cells.
+    Gpu,
+    /// On the device; neighbours by the particle-cell relation table (Im16).
+    GpuRelation,
+}
+
+impl Prepare {
+    pub fn on_device(self) -> bool {
+        self != Prepare::Cpu
+    }
 }
 
 impl Scene {
@@ -78,8 +99,16 @@ impl Scene {
         let options = Options {
             support: file.support.map(|s| s as f32),
             splash_threshold: source.splash_threshold.unwrap_or(Options::default().splash_threshold),
+            search: if source.prepare == Prepare::GpuRelation { Search::Relation } else { Search::Runs },
             ..Options::default()
         };
+        if source.prepare.on_device() && (classes.is_some() || axes.is_some()) {
+            return Err(format!(
+                "{} brings classes or ellipsoids of its own, and --prepare gpu makes them anew: use --prepare cpu",
+                path.display()
+            )
+            .into());
+        }
         let input = Input {
             positions: &positions,
             radius: radius as f32,
@@ -88,19 +117,45 @@ impl Scene {
         };
         let bar = progress(positions.len() as u64, "classes and ellipsoids");
         let start = std::time::Instant::now();
-        let (particles, report) =
-            prepare::prepare_with_progress(&input, &options, &|done| bar.set_position(done as u64))?;
+        let (particles, report) = if source.prepare.on_device() {
+            (uniform(&positions, radius as f32), Report::default())
+        } else {
+            prepare::prepare_with_progress(&input, &options, &|done| bar.set_position(done as u64))?
+        };
         let prepare_ms = start.elapsed().as_secs_f64() * 1e3;
         bar.finish_and_clear();
-        let density =
-            if report.body > 0 { Some(DensityField::new(&positions, radius as f32, &options)?) } else { None };
-        Ok(Scene { particles, report, origin, radius_source, dropped, prepare_ms, density })
+        let density = if report.body > 0 || source.prepare.on_device() {
+            Some(DensityField::new(&positions, radius as f32, &options)?)
+        } else {
+            None
+        };
+        Ok(Scene { particles, report, origin, radius_source, dropped, prepare_ms, positions, options, density })
+    }
+
+    /// Its positions in a buffer of the device's, tightly packed.
+    pub fn on_device(&self, buffer: ash::vk::Buffer) -> DevicePositions {
+        DevicePositions {
+            buffer,
+            offset: 0,
+            stride: 12,
+            count: self.positions.len() as u32,
+            radius: self.particles.radius,
+            options: self.options,
+            keep_class_below: None,
+        }
     }
 
     /// Whether a point (relative to the origin) is inside the body: half as dense as a filled body.
     pub fn inside(&self, point: Vec3) -> bool {
         self.density.as_ref().is_some_and(|d| d.relative_density(point) >= 0.5)
     }
+}
+
+/// Spheres as large as any ellipsoid that the device may make: for the camera, and for the box around the liquid.
+fn uniform(positions: &[Vec3], radius: f32) -> Particles {
+    let axes = Mat3::from_diagonal(Vec3::splat(radius * Options::default().max_semi_axis));
+    let ellipsoids = positions.iter().map(|p| Ellipsoid { center: *p, axes }).collect();
+    Particles { radius, ellipsoids, splash_count: 0 }
 }
 
 /// Zero, or the middle of a cloud that lies so far out that single precision would coarsen it.

@@ -32,7 +32,7 @@ pub fn write(
     let direction = session.words(Id::Direction, 0)?.unwrap_or_default();
     let flipped: f64 = direction.chunks_exact(4).map(|d| f64::from(f32::from_bits(d[3]))).sum();
     guards.insert("walk_normal_faced_the_wrong_way".into(), json!(flipped));
-    let r = &job.scene.report;
+    let r = &job.report;
     guards.insert("ellipsoid_few_neighbours".into(), json!(r.few_neighbours));
     guards.insert("ellipsoid_degenerate".into(), json!(r.degenerate));
     guards.insert("ellipsoid_clamped_long".into(), json!(r.clamped_long));
@@ -47,6 +47,7 @@ pub fn write(
         "meniscus": env!("CARGO_PKG_VERSION"),
         "device": {"name": info.name, "driver": info.driver, "kind": info.kind, "vulkan": info.api},
         "particles": {"splash": r.splash, "body": r.body, "dropped": job.scene.dropped, "radius_source": job.scene.radius_source},
+        "prepare": format!("{:?}", job.args.prepare).to_lowercase(),
         "prepare_cpu_ms": job.scene.prepare_ms,
         "gpu": gpu,
         "gpu_protocol": "second frame after start, by timestamps; validation makes times meaningless",
