@@ -37,6 +37,7 @@ const SHADERS: &[(&str, &str, &[&str])] = &[
 fn main() {
     println!("cargo:rerun-if-changed=glsl");
     println!("cargo:rerun-if-changed=build");
+    commit();
     let mut rust = String::new();
     let shared = fs::read_to_string("glsl/include/shared.glsl").expect("glsl/include/shared.glsl");
     rust += &shared::to_rust(&shared).unwrap_or_else(|e| fail(&format!("glsl/include/shared.glsl:{e}")));
@@ -55,6 +56,17 @@ fn main() {
     }
     let out = Path::new(&env::var("OUT_DIR").expect("cargo sets OUT_DIR")).join("shaders.rs");
     fs::write(out, rust).expect("OUT_DIR is writable");
+}
+
+/// The commit this is built from, for figures that say what they were measured with.
+fn commit() {
+    let git = std::process::Command::new("git").args(["rev-parse", "--short=12", "HEAD"]).output();
+    let hash = git.ok().filter(|o| o.status.success()).map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned());
+    println!("cargo:rustc-env=MENISCUS_COMMIT={}", hash.unwrap_or_else(|| "unknown".into()));
+    // A file that is not there would make every build run this anew.
+    if Path::new(".git/logs/HEAD").exists() {
+        println!("cargo:rerun-if-changed=.git/logs/HEAD");
+    }
 }
 
 /// SPIR-V of one shader, or a failed build that names file and line.

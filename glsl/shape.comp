@@ -51,12 +51,41 @@ uint search(ivec3 c, bool inclusive, uint low) {
     return low;
 }
 
-// Whether the offset o = b - a, rounded, is shorter than the reach; a tie of float32 is decided from a and b themselves, to
-// 2^-45 of the square.
-bool nearer(vec3 a, vec3 b, vec3 o, float squared) {
+// The same among keys of one word: first place, not before `low`, whose key is not smaller than `key`. What is looked for is
+// mostly near: strides grow from there.
+uint search_key(uint key, uint low) {
+    uint keys = free_half(), reach = 8u;
+    while (low + reach < count() && order.at[keys + low + reach] < key) {
+        low += reach;
+        reach *= 4u;
+    }
+    uint high = min(low + reach, count());
+    while (low < high) {
+        uint middle = low + (high - low) / 2u;
+        if (order.at[keys + middle] < key) low = middle + 1u;
+        else high = middle;
+    }
+    return low;
+}
+
+// The run of particles in the cells from `from` to `to`, which differ in z alone; it does not begin before `low`.
+uvec2 run_of(ivec3 from, ivec3 to, uint low) {
+    if (key_bits() > 32u) {
+        uint begin = search(from, false, low);
+        return uvec2(begin, search(to, true, begin));
+    }
+    ivec3 first = first_cell(), last = last_cell();
+    from.z = max(from.z, first.z);
+    to.z = min(to.z, last.z);
+    if (any(lessThan(from.xy, first.xy)) || any(greaterThan(from.xy, last.xy)) || from.z > to.z) return uvec2(low, low);
+    uint begin = search_key(sort_key(from).x, low), key = sort_key(to).x;
+    // The last key of all has none after it.
+    return uvec2(begin, key == 0xffffffffu ? count() : search_key(key + 1u, begin));
+}
+
+// Whether b - a is shorter than the reach: ties of float32 decided to 2^-45 of the square.
+bool nearer(vec3 a, vec3 b) {
     float reach = prepare.lengths.w;
-    precise float limit = reach * reach;
-    if (abs(squared - limit) > 4e-6 * limit) return squared < limit;
     vec2 x = two_sum(b.x, -a.x), y = two_sum(b.y, -a.y), z = two_sum(b.z, -a.z);
     vec2 xx = two_product(x.x, x.x), yy = two_product(y.x, y.x), zz = two_product(z.x, z.x), rr = two_product(reach, reach);
     vec2 s = two_sum(xx.x, yy.x), t = two_sum(s.x, zz.x);
@@ -105,9 +134,11 @@ struct Sums {
     vec3 mixed_part;
 };
 
-void add(inout Sums s, vec3 o, float squared) {
-    float d = sqrt(squared), q = d * (1.0 / prepare.lengths.w), w = 1.0 - q * q * q;
-    s.number += 1u;
+// Adds what is near; a choice of numbers costs less than a branch that neighbouring invocations take differently.
+void add(inout Sums s, bool near, vec3 o, float squared) {
+    o = near ? o : vec3(0.0);
+    float d = sqrt(near ? squared : prepare.lengths.w * prepare.lengths.w), q = d * (1.0 / prepare.lengths.w), w = near ? 1.0 - q * q * q : 0.0;
+    s.number += near ? 1u : 0u;
     s.density += spline(d * (1.0 / prepare.lengths.z));
     s.weight += w;
     s.first += w * o;
@@ -176,6 +207,7 @@ void main() {
     uint from = min(invocation() * SHAPE_RUN, count()), to = min(from + SHAPE_RUN, count());
     ivec3 cell = ivec3(0);
     uvec2 runs[LARGEST_RUNS];
+    uint begins[LARGEST_RUNS];
     uint number = 0u;
     for (uint k = from; k < to; ++k) {
         vec3 x = sorted_position(k);
@@ -185,6 +217,8 @@ void main() {
         }
         ivec3 own = cell_of(x);
         if (number == 0u || own != cell) {
+            // Further along the same columns, runs begin no earlier than they did.
+            bool along = number > 0u && own.xy == cell.xy && own.z > cell.z;
             cell = own;
             number = 0u;
             if (RELATION) {
@@ -192,18 +226,21 @@ void main() {
                 runs[number++] = uvec2(begin, search(cell, true, begin));
             } else {
                 int around = int(prepare.options.w);
-                uint begin = 0u;
+                uint begin = 0u, column = 0u;
                 for (int i = -around; i <= around; ++i) {
                     for (int j = -around; j <= around; ++j) {
-                        begin = search(cell + ivec3(i, j, -around), false, begin);
-                        uint end = search(cell + ivec3(i, j, around), true, begin);
-                        if (end > begin) runs[number++] = uvec2(begin, end);
+                        if (along) begin = begins[column];
+                        uvec2 run = run_of(cell + ivec3(i, j, -around), cell + ivec3(i, j, around), begin);
+                        begins[column++] = run.x;
+                        begin = run.y;
+                        if (run.y > run.x) runs[number++] = run;
                     }
                 }
             }
         }
         Sums s = Sums(0u, 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0));
         // One loop over all runs: invocations whose runs differ in length stay together.
+        float limit = prepare.lengths.w * prepare.lengths.w;
         uint run = 0u, j = runs[0].x, end = runs[0].y;
         while (true) {
             if (j == end) {
@@ -214,12 +251,12 @@ void main() {
             uint other = RELATION ? order_at(j) / 27u : j;
             vec3 y = sorted_position(other), o = y - x;
             float squared = dot(o, o);
-            if (nearer(x, y, o, squared)) {
+            bool near = squared < limit;
+            if (abs(squared - limit) <= 4e-6 * limit) near = nearer(x, y);
 #ifdef NEIGHBOURS
-                if (s.number < NEIGHBOUR_ROOM) neighbours.at[k * (NEIGHBOUR_ROOM + 2u) + 2u + s.number] = input_index(other);
+            if (near && s.number < NEIGHBOUR_ROOM) neighbours.at[k * (NEIGHBOUR_ROOM + 2u) + 2u + s.number] = input_index(other);
 #endif
-                add(s, o, squared);
-            }
+            add(s, near, o, squared);
             ++j;
         }
 #ifdef NEIGHBOURS

@@ -22,23 +22,8 @@ uint blocks() { return (entries() + BLOCK - 1u) / BLOCK; }
 // The entry at a place before this pass; the first pass finds the input's order.
 uint entry_at(uint place, uint pass) { return pass == 0u ? place : order.at[(pass & 1u) * entries() + place]; }
 
-// Adds an axis's bits to a key of three words.
-void append(inout uvec3 key, inout uint length, uint value, uint bits) {
-    uint word = length >> 5, shift = length & 31u;
-    if (bits > 0u) {
-        key[word] |= value << shift;
-        if (shift > 0u && word < 2u) key[word + 1u] |= value >> (32u - shift);
-    }
-    length += bits;
-}
-
 uint digit_of(uint entry) {
-    ivec3 first = first_cell();
-    uvec3 cell = uvec3(entry_cell(entry) - first), key = uvec3(0u);
-    uint length = 0u;
-    append(key, length, cell.z, extent.at[EXTENT_BITS + 2]);
-    append(key, length, cell.y, extent.at[EXTENT_BITS + 1]);
-    append(key, length, cell.x, extent.at[EXTENT_BITS]);
+    uvec3 key = sort_key(entry_cell(entry));
     uint from = prepare.options.y * DIGIT_BITS, word = from >> 5, shift = from & 31u;
     uint bits = key[word] >> shift;
     if (shift > 32u - DIGIT_BITS && word < 2u) bits |= key[word + 1u] << (32u - shift);
@@ -61,6 +46,8 @@ void main() {
     sorted.at[3u * k] = x.x;
     sorted.at[3u * k + 1u] = x.y;
     sorted.at[3u * k + 2u] = x.z;
+    // Where keys are one word they are kept, in the half of the order that is free now: look-ups are faster for it.
+    if (prepare.source.w == 1u && key_bits() <= 32u) order.at[free_half() + k] = sort_key(cell_of(x)).x;
 #else
     uint block = group_index(), t = gl_LocalInvocationIndex, pass = prepare.options.y;
     if (block >= blocks()) return;

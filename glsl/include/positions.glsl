@@ -59,3 +59,28 @@ ivec3 entry_offset(uint entry) {
 ivec3 entry_cell(uint e) {
     return prepare.source.w == 1u ? cell_of(position(e)) : cell_of(position(e / 27u)) + entry_offset(e);
 }
+
+// Adds an axis's bits to a key of three words.
+void append(inout uvec3 key, inout uint length, uint value, uint bits) {
+    uint word = length >> 5, shift = length & 31u;
+    if (bits > 0u) {
+        key[word] |= value << shift;
+        if (shift > 0u && word < 2u) key[word + 1u] |= value >> (32u - shift);
+    }
+    length += bits;
+}
+
+// A cell's sort key, relative to the first: z in the lowest bits, then y, then x.
+uvec3 sort_key(ivec3 whole) {
+    uvec3 cell = uvec3(whole - first_cell()), key = uvec3(0u);
+    uint length = 0u;
+    append(key, length, cell.z, extent.at[EXTENT_BITS + 2]);
+    append(key, length, cell.y, extent.at[EXTENT_BITS + 1]);
+    append(key, length, cell.x, extent.at[EXTENT_BITS]);
+    return key;
+}
+
+uint key_bits() { return extent.at[EXTENT_BITS] + extent.at[EXTENT_BITS + 1] + extent.at[EXTENT_BITS + 2]; }
+
+// Where the half of the order begins that the sort does not leave its result in.
+uint free_half() { return ((extent.at[EXTENT_PASSES] + 1u) & 1u) * prepare.source.x * prepare.source.w; }

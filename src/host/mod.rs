@@ -75,6 +75,8 @@ pub struct DeviceInfo {
     pub timestamps: bool,
     /// Whether large points are there.
     pub large_points: bool,
+    /// Validation layers and other tools that are active and would spoil times.
+    pub slowed_by: Vec<String>,
     rank: u32,
     handle: vk::PhysicalDevice,
     family: u32,
@@ -201,10 +203,33 @@ impl Instance {
             image_size: properties.limits.max_image_dimension2_d,
             timestamps: families.get(family as usize).is_some_and(|f| f.timestamp_valid_bits > 0),
             large_points: features.large_points != 0,
+            slowed_by: self.tools(handle, properties.api_version),
             rank,
             handle,
             family,
         }
+    }
+
+    /// Active tools that validate, trace or modify what is called.
+    fn tools(&self, handle: vk::PhysicalDevice, api: u32) -> Vec<String> {
+        if api < vk::API_VERSION_1_3 {
+            return Vec::new();
+        }
+        // SAFETY: core in 1.3; the physical device is this instance's, and the slice is as long as was said.
+        let tools = unsafe {
+            let count = self.handle.get_physical_device_tool_properties_len(handle).unwrap_or(0);
+            let mut tools = vec![vk::PhysicalDeviceToolProperties::default(); count];
+            match self.handle.get_physical_device_tool_properties(handle, &mut tools) {
+                Ok(()) => tools,
+                Err(_) => Vec::new(),
+            }
+        };
+        let spoils =
+            vk::ToolPurposeFlags::VALIDATION | vk::ToolPurposeFlags::TRACING | vk::ToolPurposeFlags::MODIFYING_FEATURES;
+        let named = |t: &vk::PhysicalDeviceToolProperties| {
+            t.name_as_c_str().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+        };
+        tools.iter().filter(|t| t.purposes.intersects(spoils)).map(named).collect()
     }
 
     /// The best device, or the first whose name or driver contains `wanted` (case does not matter).

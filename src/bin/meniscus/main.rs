@@ -1,11 +1,13 @@
 //! The `meniscus` command: a caller of the library like any other.
 
+mod bench;
 mod camera;
 mod codes;
 mod dump;
 mod info;
 mod prepared;
 mod render;
+mod report;
 mod scene;
 mod stats;
 
@@ -28,6 +30,8 @@ struct Cli {
 enum Command {
     /// Render particles to a picture.
     Render(Box<render::Args>),
+    /// Measure what each pass takes.
+    Bench(Box<bench::Args>),
     /// List devices, drivers, features, limits and file formats.
     Info,
 }
@@ -35,6 +39,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Render(args) => render::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Info => info::run(),
     };
     match result {

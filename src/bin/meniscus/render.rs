@@ -112,7 +112,7 @@ pub enum WeightingArg {
     Euclidean,
 }
 
-fn parse_size(s: &str) -> Result<[u32; 2], String> {
+pub fn parse_size(s: &str) -> Result<[u32; 2], String> {
     let parse = |t: &str| t.parse().map_err(|_| format!("\"{s}\" is not WIDTHxHEIGHT, such as 1024x768"));
     let (w, h) = s.split_once('x').ok_or_else(|| format!("\"{s}\" is not WIDTHxHEIGHT, such as 1024x768"))?;
     Ok([parse(w)?, parse(h)?])

@@ -132,6 +132,29 @@ impl Scene {
         Ok(Scene { particles, report, origin, radius_source, dropped, prepare_ms, positions, options, density })
     }
 
+    /// Positions that were made, not read.
+    pub fn synthetic(positions: Vec<Vec3>, radius: f32, where_: Prepare) -> Result<Scene, Box<dyn Error>> {
+        let search = if where_ == Prepare::GpuRelation { Search::Relation } else { Search::Runs };
+        let options = Options { search, ..Options::default() };
+        let start = std::time::Instant::now();
+        let (particles, report) = if where_.on_device() {
+            (uniform(&positions, radius), Report::default())
+        } else {
+            prepare::prepare(&Input { positions: &positions, radius, classes: None, ellipsoids: None }, &options)?
+        };
+        Ok(Scene {
+            particles,
+            report,
+            origin: DVec3::ZERO,
+            radius_source: "made",
+            dropped: 0,
+            prepare_ms: start.elapsed().as_secs_f64() * 1e3,
+            positions,
+            options,
+            density: None,
+        })
+    }
+
     /// Its positions in a buffer of the device's, tightly packed.
     pub fn on_device(&self, buffer: ash::vk::Buffer) -> DevicePositions {
         DevicePositions {

@@ -1,0 +1,288 @@
+//! `meniscus bench`: what each pass takes, in figures that can be repeated.
+
+use crate::{
+    camera::{self, View},
+    report,
+    scene::{Prepare, Scene, Source, progress},
+};
+use glam::{DVec3, Vec3};
+use meniscus::{
+    Equirect, FrameInput, Settings,
+    host::{Gpu, Instance, Session, Upload},
+    io::images,
+    profile::FrameTimes,
+    targets::LedgerEntry,
+};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Particle files; the built-in scenes if none is named
+    pub files: Vec<PathBuf>,
+    /// Also the built-in scenes: the embedded dam break, a block of 100,000 particles, 20,000 droplets
+    #[arg(long)]
+    pub scenes: bool,
+    /// Blocks of 1 k, 10 k, 100 k, 1 M, 4 M and 10 M particles, and how time grows with their number
+    #[arg(long)]
+    pub scaling: bool,
+    /// Leave out blocks of more particles
+    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
+    pub max_particles: u32,
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "1024x768", value_parser = crate::render::parse_size)]
+    pub size: [u32; 2],
+    /// Frames that are measured
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// Frames before them
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub warmup: u32,
+    /// Device whose name or driver contains this; the best one if not given
+    #[arg(long, value_name = "NAME")]
+    pub device: Option<String>,
+    /// Where classes and ellipsoids are made
+    #[arg(long, value_enum, default_value = "gpu")]
+    pub prepare: Prepare,
+    /// Surfaces at which light bends: 1, 2 or 4
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub refractions: u32,
+    /// Total internal reflections followed
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub internal_reflections: u32,
+    /// Plane-fitting window in pixels: odd
+    #[arg(long, value_name = "N", default_value_t = 9)]
+    pub window: u32,
+    /// Plane-fitting iterations
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub iterations: u32,
+    /// Draw every particle, also those that others hide
+    #[arg(long)]
+    pub no_culling: bool,
+    /// Where to write the figures: .json or .csv; the terminal shows them in any case
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+/// What one scene gave.
+pub struct Run {
+    pub scene: String,
+    pub particles: usize,
+    pub radius: f32,
+    pub prepare_cpu_ms: f64,
+    /// Each pass's milliseconds, frame by frame, in the order of the frame; passes of one name are summed.
+    pub passes: Vec<(String, Vec<f64>)>,
+    /// First to last timestamp, and the sum of the passes, frame by frame.
+    pub span: Vec<f64>,
+    pub sum: Vec<f64>,
+    pub memory: Vec<LedgerEntry>,
+}
+
+impl Run {
+    /// Milliseconds of the preparation on the device, frame by frame.
+    pub fn preparation(&self) -> Vec<f64> {
+        let of =
+            |i: usize| self.passes.iter().filter(|(n, _)| PREPARATION.contains(&n.as_str())).map(|(_, t)| t[i]).sum();
+        (0..self.span.len()).map(of).collect()
+    }
+
+    /// Bytes that grow with the number of particles, for each of them; the positions' own 12 included.
+    pub fn bytes_per_particle(&self, on_device: bool) -> f64 {
+        let bytes: u64 = self.memory.iter().filter(|e| PER_PARTICLE.contains(&e.name)).map(|e| e.bytes).sum();
+        bytes as f64 / self.particles.max(1) as f64 + if on_device { 12.0 } else { 0.0 }
+    }
+}
+
+const PREPARATION: [&str; 3] = ["extent", "sort", "shape"];
+const PER_PARTICLE: [&str; 9] = [
+    "sort order",
+    "sorted positions",
+    "last classes",
+    "particle centres",
+    "particle shapes (diagonal)",
+    "particle shapes (mixed)",
+    "visible particles",
+    "prefix sums",
+    "drawn particles",
+];
+
+/// Seed of the built-in scenes.
+pub const SEED: u64 = 1;
+
+pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
+    if let Some(path) = &args.output {
+        report::check_extension(path)?;
+        images::check_folder(path)?;
+    }
+    let instance = Instance::new(false)?;
+    let device = instance.pick(args.device.as_deref())?;
+    // Older layers do not say that they are there, but the loader was told.
+    let asked = ["VK_INSTANCE_LAYERS", "VK_LOADER_LAYERS_ENABLE"]
+        .into_iter()
+        .find(|name| std::env::var(name).is_ok_and(|layers| layers.to_lowercase().contains("validation")));
+    if let Some(tool) = device.slowed_by.first().map(String::as_str).or(asked) {
+        return Err(format!(
+            "validation is on ({tool}): times would mean nothing. Unset VK_INSTANCE_LAYERS and the like"
+        )
+        .into());
+    }
+    let settings = Settings {
+        refractions: args.refractions,
+        internal_reflections: args.internal_reflections,
+        window: args.window,
+        iterations: args.iterations,
+        occlusion_culling: !args.no_culling,
+        absorption: Vec3::new(1.0, 0.35, 0.2),
+        ..Settings::default()
+    };
+    settings.validate()?;
+    println!("device: {} ({}); meniscus {} {}", device.name, device.driver, env!("CARGO_PKG_VERSION"), report::COMMIT);
+    let gpu = Gpu::new(&instance, device)?;
+    let mut session = Session::new(&gpu, args.size, &Equirect::procedural_sky())?;
+    let runs = all(args, &settings, &mut session);
+    session.end();
+    let runs = runs?;
+    let growth = args.scaling.then(|| report::growth(&runs));
+    if let Some((exponent, from)) = growth.flatten() {
+        println!("preparation grows with the power {exponent:.3} of the number of particles, from {from} on");
+    }
+    if let Some(path) = &args.output {
+        report::write(path, args, &settings, &gpu.info, &runs)?;
+        println!("wrote {}", path.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn all(args: &Args, settings: &Settings, session: &mut Session) -> Result<Vec<Run>, Box<dyn std::error::Error>> {
+    let mut runs = Vec::new();
+    let mut add = |name: String, scene: Scene| -> Result<(), Box<dyn std::error::Error>> {
+        let run = measure(args, settings, session, name, &scene)?;
+        report::print(&run, args.prepare.on_device());
+        runs.push(run);
+        Ok(())
+    };
+    for file in &args.files {
+        add(file.display().to_string(), load(args, Some(file))?)?;
+    }
+    if args.scenes || (args.files.is_empty() && !args.scaling) {
+        add("embedded dam break".into(), load(args, None)?)?;
+        add("block of 100,000".into(), Scene::synthetic(block(100_000), RADIUS, args.prepare)?)?;
+        add("20,000 droplets".into(), Scene::synthetic(droplets(20_000), RADIUS, args.prepare)?)?;
+    }
+    if args.scaling {
+        for n in [1_000, 10_000, 100_000, 1_000_000, 4_000_000, 10_000_000] {
+            if n <= args.max_particles {
+                add(format!("block of {n}"), Scene::synthetic(block(n), RADIUS, args.prepare)?)?;
+            }
+        }
+    }
+    Ok(runs)
+}
+
+fn load(args: &Args, file: Option<&PathBuf>) -> Result<Scene, Box<dyn std::error::Error>> {
+    let file = file.map(PathBuf::as_path);
+    Scene::load(&Source { file, radius: None, splash_threshold: None, drop_invalid: false, prepare: args.prepare })
+}
+
+const RADIUS: f32 = 0.01;
+
+/// SplitMix64 (Steele et al. 2014): the same numbers everywhere.
+fn unit(state: &mut u64) -> f32 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
+}
+
+fn offset(state: &mut u64, reach: f32) -> Vec3 {
+    (2.0 * Vec3::new(unit(state), unit(state), unit(state)) - 1.0) * reach
+}
+
+/// A block of liquid, 2 : 1 : 1, at rest spacing, each particle a fifth of a radius off its place, in random order.
+fn block(count: u32) -> Vec<Vec3> {
+    let mut state = SEED;
+    let edge = (f64::from(count) / 2.0).cbrt().ceil() as u32;
+    let place =
+        |i: u32| Vec3::new((i % (2 * edge)) as f32, (i / (2 * edge) % edge) as f32, (i / (2 * edge * edge)) as f32);
+    let mut all: Vec<Vec3> = (0..count).map(|i| 2.0 * RADIUS * place(i) + offset(&mut state, 0.2 * RADIUS)).collect();
+    // A simulation's order has little to do with space either.
+    for i in (1..all.len()).rev() {
+        all.swap(i, (unit(&mut state) * (i + 1) as f32) as usize % (i + 1));
+    }
+    all
+}
+
+/// Droplets far apart.
+fn droplets(count: u32) -> Vec<Vec3> {
+    let mut state = SEED;
+    (0..count).map(|_| offset(&mut state, 100.0 * RADIUS)).collect()
+}
+
+fn measure(
+    args: &Args,
+    settings: &Settings,
+    session: &mut Session,
+    name: String,
+    scene: &Scene,
+) -> Result<Run, Box<dyn std::error::Error>> {
+    let aspect = args.size[0] as f32 / args.size[1] as f32;
+    let view = View { eye: None, target: None, up: DVec3::Y, fov_y_deg: 40.0 };
+    let (camera, eye) = camera::frame(&view, scene.origin, &scene.particles, aspect, 0.1 * scene.particles.radius)?;
+    let upload = if args.prepare.on_device() {
+        Some(Upload::new(session.gpu, bytemuck::cast_slice(&scene.positions))?)
+    } else {
+        session.renderer.set_particles(&scene.particles)?;
+        None
+    };
+    let input = FrameInput {
+        slot: 0,
+        camera: &camera,
+        settings,
+        scene: None,
+        eye_inside: scene.inside(eye),
+        output: ash::vk::ImageView::null(),
+        debug: false,
+        positions: upload.as_ref().map(|u| scene.on_device(u.buffer)),
+        neighbours: false,
+    };
+    let bar = progress(u64::from(args.warmup + args.frames), "frames");
+    let mut frames: Vec<FrameTimes> = Vec::new();
+    for i in 0..args.warmup + args.frames {
+        let times = session.frame(&input)?.ok_or("this device has no timestamps: nothing can be measured")?;
+        bar.inc(1);
+        if i >= args.warmup {
+            frames.push(times);
+        }
+    }
+    bar.finish_and_clear();
+    let mut order = Vec::new();
+    let mut passes: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for (i, frame) in frames.iter().enumerate() {
+        for p in &frame.passes {
+            let times = passes.entry(p.name.clone()).or_insert_with(|| {
+                order.push(p.name.clone());
+                vec![0.0; frames.len()]
+            });
+            times[i] += p.ms;
+        }
+    }
+    let passes = order.into_iter().map(|n| (n.clone(), passes[&n].clone())).collect();
+    Ok(Run {
+        scene: name,
+        particles: scene.positions.len(),
+        radius: scene.particles.radius,
+        prepare_cpu_ms: if args.prepare.on_device() { 0.0 } else { scene.prepare_ms },
+        passes,
+        span: frames.iter().map(|f| f.span_ms).collect(),
+        sum: frames.iter().map(|f| f.passes.iter().map(|p| p.ms).sum()).collect(),
+        memory: session.renderer.memory(),
+    })
+}
+
+/// Whether figures can be written there.
+pub fn extension(path: &Path) -> Option<&str> {
+    path.extension().and_then(|e| e.to_str())
+}

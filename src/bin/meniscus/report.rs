@@ -1,0 +1,186 @@
+//! The figures of `meniscus bench`: on the terminal, as JSON, as CSV.
+
+use crate::bench::{Args, Run, SEED, extension};
+use meniscus::{Settings, host::DeviceInfo, io::images::write_file};
+use serde_json::{Value, json};
+use std::{error::Error, path::Path};
+
+/// Commit this was built from.
+pub const COMMIT: &str = env!("MENISCUS_COMMIT");
+
+pub fn check_extension(path: &Path) -> Result<(), String> {
+    match extension(path) {
+        Some("json" | "csv") => Ok(()),
+        _ => Err(format!("{}: name a file that ends in .json or .csv", path.display())),
+    }
+}
+
+/// Value below which a share of the sorted times lies, by linear interpolation.
+fn quantile(times: &[f64], share: f64) -> f64 {
+    let mut sorted = times.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let at = share * (sorted.len() - 1) as f64;
+    let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
+    low + (high - low) * at.fract()
+}
+
+pub fn median(times: &[f64]) -> f64 {
+    quantile(times, 0.5)
+}
+
+/// Everything timed of a run: name and its milliseconds, frame by frame.
+fn rows(run: &Run) -> Vec<(String, Vec<f64>)> {
+    let mut rows = run.passes.clone();
+    if run.preparation().iter().any(|t| *t > 0.0) {
+        rows.push(("= preparation".into(), run.preparation()));
+    }
+    rows.push(("= sum of passes".into(), run.sum.clone()));
+    rows.push(("= frame, first to last timestamp".into(), run.span.clone()));
+    rows
+}
+
+pub fn print(run: &Run, on_device: bool) {
+    println!(
+        "\n{}: {} particles, {:.1} bytes of device memory each, {:.1} MB in all",
+        run.scene,
+        run.particles,
+        run.bytes_per_particle(on_device),
+        run.memory.iter().map(|e| e.bytes).sum::<u64>() as f64 * 1e-6
+    );
+    println!("{:<34} {:>10} {:>10} {:>10}  ms", "pass", "median", "p5", "p95");
+    for (name, times) in rows(run) {
+        println!(
+            "{name:<34} {:>10.3} {:>10.3} {:>10.3}",
+            median(&times),
+            quantile(&times, 0.05),
+            quantile(&times, 0.95)
+        );
+    }
+    if !on_device {
+        println!("{:<34} {:>10.3}", "preparation on the CPU, once", run.prepare_cpu_ms);
+    }
+}
+
+/// Exponent of the preparation's median time against the number of particles, fitted to runs of 100,000 and more, where
+/// there are two, else to all; and the least number of particles among them.
+pub fn growth(runs: &[Run]) -> Option<(f64, usize)> {
+    let points = |least: usize| {
+        let fits = runs.iter().filter(|r| r.particles >= least && median(&r.preparation()) > 0.0);
+        fits.map(|r| ((r.particles as f64).ln(), median(&r.preparation()).ln())).collect::<Vec<_>>()
+    };
+    let (points, from) = Some((points(100_000), 100_000)).filter(|(p, _)| p.len() >= 2).unwrap_or((points(1), 1));
+    let n = points.len() as f64;
+    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let spread: f64 = points.iter().map(|p| (p.0 - mx).powi(2)).sum();
+    let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / spread;
+    slope.is_finite().then_some((slope, from))
+}
+
+fn figures(times: &[f64]) -> Value {
+    json!({"median_ms": median(times), "p5_ms": quantile(times, 0.05), "p95_ms": quantile(times, 0.95)})
+}
+
+pub fn write(
+    path: &Path,
+    args: &Args,
+    settings: &Settings,
+    device: &DeviceInfo,
+    runs: &[Run],
+) -> Result<(), Box<dyn Error>> {
+    let on_device = args.prepare.on_device();
+    if extension(path) == Some("csv") {
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        csv.write_record([
+            "scene",
+            "particles",
+            "pass",
+            "median_ms",
+            "p5_ms",
+            "p95_ms",
+            "frames",
+            "warmup",
+            "size",
+            "prepare",
+            "device",
+            "driver",
+            "commit",
+            "seed",
+            "refractions",
+            "internal_reflections",
+            "window",
+            "iterations",
+            "bytes_per_particle",
+        ])?;
+        for run in runs {
+            for (name, times) in rows(run) {
+                let ms = |share| format!("{:.6}", quantile(&times, share));
+                csv.write_record([
+                    run.scene.clone(),
+                    run.particles.to_string(),
+                    name.trim_start_matches("= ").to_owned(),
+                    ms(0.5),
+                    ms(0.05),
+                    ms(0.95),
+                    args.frames.to_string(),
+                    args.warmup.to_string(),
+                    format!("{}x{}", args.size[0], args.size[1]),
+                    format!("{:?}", args.prepare).to_lowercase(),
+                    device.name.clone(),
+                    device.driver.clone(),
+                    COMMIT.to_owned(),
+                    SEED.to_string(),
+                    settings.refractions.to_string(),
+                    settings.internal_reflections.to_string(),
+                    settings.window.to_string(),
+                    settings.iterations.to_string(),
+                    format!("{:.3}", run.bytes_per_particle(on_device)),
+                ])?;
+            }
+        }
+        write_file(path, &csv.into_inner()?)?;
+        return Ok(());
+    }
+    let each: Vec<_> = runs
+        .iter()
+        .map(|run| {
+            json!({
+                "scene": run.scene,
+                "particles": run.particles,
+                "radius": run.radius,
+                "passes": run.passes.iter().map(|(name, t)| json!({"pass": name, "ms": figures(t)})).collect::<Vec<_>>(),
+                "preparation": figures(&run.preparation()),
+                "preparation_cpu_ms": if on_device { Value::Null } else { json!(run.prepare_cpu_ms) },
+                "sum_of_passes": figures(&run.sum),
+                "frame_span": figures(&run.span),
+                "bytes_per_particle": run.bytes_per_particle(on_device),
+                "memory": run.memory.iter().map(|e| json!({"resource": e.name, "bytes": e.bytes})).collect::<Vec<_>>(),
+            })
+        })
+        .collect();
+    let all = json!({
+        "meniscus": env!("CARGO_PKG_VERSION"),
+        "commit": COMMIT,
+        "command": std::env::args().collect::<Vec<_>>(),
+        "device": {"name": device.name, "driver": device.driver, "kind": device.kind, "vulkan": device.api},
+        "protocol": {
+            "times": "GPU timestamps around each pass; passes of one name summed; every frame waited for",
+            "frames": args.frames,
+            "warmup": args.warmup,
+            "size": args.size,
+            "seed": SEED,
+            "prepare": format!("{:?}", args.prepare).to_lowercase(),
+            "camera": "frames the liquid, 40 degrees high",
+            "refractions": settings.refractions,
+            "internal_reflections": settings.internal_reflections,
+            "window": settings.window,
+            "iterations": settings.iterations,
+            "sigma_radii": settings.sigma,
+            "occlusion_culling": settings.occlusion_culling,
+            "validation": false,
+        },
+        "runs": each,
+        "growth": args.scaling.then(|| growth(runs)).flatten().map(|(exponent, from)| json!({"exponent": exponent, "from_particles": from, "of": "median preparation"})),
+    });
+    write_file(path, serde_json::to_string_pretty(&all)?.as_bytes())?;
+    Ok(())
+}
