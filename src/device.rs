@@ -55,6 +55,8 @@ pub struct Limits {
     pub groups: u32,
     /// Largest storage buffer in bytes.
     pub storage_size: u64,
+    /// Largest device-local heap in bytes.
+    pub memory: u64,
 }
 
 /// Checks that a physical device can render at all; lists the first thing it lacks. What must also be *enabled* on
@@ -112,6 +114,10 @@ impl Host {
                 self.instance.get_physical_device_queue_family_properties(self.physical_device),
             )
         };
+        // SAFETY: as above.
+        let memory = unsafe { self.instance.get_physical_device_memory_properties(self.physical_device) };
+        let local =
+            memory.memory_heaps_as_slice().iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
         let bits = families.get(self.queue_family as usize).map_or(0, |f| f.timestamp_valid_bits);
         Limits {
             point_size: if self.large_points { properties.limits.point_size_range[1] } else { 1.0 },
@@ -120,6 +126,7 @@ impl Host {
             timestamp_mask: if bits >= 64 { u64::MAX } else { (1u64 << bits) - 1 },
             groups: properties.limits.max_compute_work_group_count[0],
             storage_size: u64::from(properties.limits.max_storage_buffer_range),
+            memory: local.map(|h| h.size).max().unwrap_or(0),
         }
     }
 

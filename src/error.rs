@@ -33,6 +33,19 @@ pub enum Error {
         /// The allocator's reason.
         source: gpu_allocator::AllocationError,
     },
+    /// More memory than the device has; nothing was allocated.
+    #[error(
+        "a frame of this size with so many particles needs {needed} bytes of device memory; the device has {available}, \
+         so {missing} are missing. Use fewer particles or a smaller size"
+    )]
+    MemoryShort {
+        /// Bytes that everything together would take.
+        needed: u64,
+        /// Bytes of the largest device-local heap.
+        available: u64,
+        /// The difference.
+        missing: u64,
+    },
     /// A parameter is outside its range.
     #[error("{parameter} is {value}: {remedy}")]
     Parameter {

@@ -65,6 +65,11 @@ impl Table {
         Ok(())
     }
 
+    /// Whether all that is asked for is there.
+    pub fn fits(&self, needs: &Needs) -> bool {
+        Id::OWN.into_iter().all(|id| self.spec(id) == needs.spec(id))
+    }
+
     /// Forgets contents: every frame makes everything anew.
     pub fn discard_contents(&mut self) {
         self.0.values_mut().for_each(|e| e.state.discard());

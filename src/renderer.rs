@@ -1,24 +1,24 @@
 //! The renderer: made for a host's device, fed with particles, records frames.
 
+mod uploads;
+
 use crate::{
     Error, access,
     device::{self, Host, Limits},
-    environment::Equirect,
     frame,
-    particles::Particles,
     passes::Passes,
     prepare::DevicePositions,
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder, Table, used},
-    resources::{Buffer, Image, ImageSpec, Resource, Retired},
+    resources::{Buffer, Image, Resource, Retired},
     settings::{Camera, Settings},
-    shader,
     slot::Slot,
     targets::{self, Id, LedgerEntry, Needs, Preparation, Spec},
 };
 use ash::vk;
-use glam::{Mat3, Vec3, Vec4};
-use gpu_allocator::MemoryLocation;
+use glam::{Vec3, Vec4};
+use uploads::PARTICLE_ARRAYS;
+pub use uploads::pack;
 
 /// The host's opaque scene, rendered before the liquid at the same size and with the same camera.
 #[derive(Clone, Copy, Debug)]
@@ -210,130 +210,6 @@ impl Renderer {
         Ok(needs)
     }
 
-    /// Gives the particles of the frames to come. The host's memory is copied; the last particles are kept until the
-    /// frames that draw them have completed.
-    pub fn set_particles(&mut self, particles: &Particles) -> Result<(), Error> {
-        let count = particles.ellipsoids.len();
-        if !(particles.radius.is_finite() && particles.radius > 0.0) {
-            return Err(Error::parameter("particle radius", particles.radius, "use a finite length above 0"));
-        }
-        if particles.splash_count > count {
-            return Err(Error::parameter(
-                "splash count",
-                particles.splash_count,
-                format!("there are {count} particles"),
-            ));
-        }
-        let most = (self.limits.storage_size / ARRAY_BYTES).min(MOST_PARTICLES);
-        if count as u64 > most {
-            return Err(Error::parameter("particles", count, format!("this device holds {most} at most")));
-        }
-        let mut made = Vec::with_capacity(3);
-        for id in PARTICLE_ARRAYS {
-            let bytes = ARRAY_BYTES * count.max(1) as u64;
-            let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
-            match Buffer::new(&self.host, id.name(), bytes, usage, MemoryLocation::CpuToGpu) {
-                Ok(buffer) => made.push(buffer),
-                Err(e) => {
-                    made.iter_mut().for_each(|b| b.destroy(&self.host));
-                    return Err(e);
-                }
-            }
-        }
-        let Ok(mut arrays) = <[Buffer; 3]>::try_from(made) else { unreachable!("one for each array") };
-        let inverse = 1.0 / particles.radius;
-        let mut bad = None;
-        for (i, e) in particles.ellipsoids.iter().enumerate() {
-            let p = pack(e.center, e.axes * inverse);
-            // A splash's first number is negative (glsl/include/particles.glsl).
-            let sign = Vec3::new(if i < particles.splash_count { -1.0 } else { 1.0 }, 1.0, 1.0);
-            let parts = [p.center.truncate(), p.shape_diagonal.truncate() * sign, p.shape_mixed.truncate()];
-            if !parts.iter().all(|v| v.is_finite()) && bad.is_none() {
-                bad = Some(i);
-            }
-            let at = i * ARRAY_BYTES as usize;
-            for (array, part) in arrays.iter_mut().zip(&parts) {
-                array.mapped()[at..at + ARRAY_BYTES as usize].copy_from_slice(bytemuck::bytes_of(part));
-            }
-        }
-        if let Some(i) = bad {
-            arrays.iter_mut().for_each(|b| b.destroy(&self.host));
-            let remedy = "centres and semi-axes over the radius have to be finite, squared too";
-            return Err(Error::parameter("particles", format!("number {i} is out of range"), remedy));
-        }
-        for old in self.particles.replace(arrays).into_iter().flatten() {
-            self.retire(Resource::Buffer(old));
-        }
-        let bounds = particles.bounds().unwrap_or_default();
-        self.scene = SceneBounds {
-            radius: particles.radius,
-            splash: particles.splash_count,
-            body: particles.body_count(),
-            bounds,
-        };
-        Ok(())
-    }
-
-    /// Gives the environment of the frames to come; records its upload.
-    ///
-    /// # Safety
-    /// `cmd` is recording, outside rendering, and is submitted before the frames that see the map.
-    pub unsafe fn set_environment(&mut self, cmd: vk::CommandBuffer, map: &Equirect) -> Result<(), Error> {
-        let size = map.size();
-        if size.iter().any(|s| *s > self.limits.image_size) {
-            let what = format!("{}x{}", size[0], size[1]);
-            return Err(Error::parameter(
-                "environment map",
-                what,
-                format!("use at most {} pixels each way", self.limits.image_size),
-            ));
-        }
-        let bytes: &[u8] = bytemuck::cast_slice(map.texels());
-        let usage = vk::BufferUsageFlags::TRANSFER_SRC;
-        let mut staging =
-            Buffer::new(&self.host, "environment staging", bytes.len() as u64, usage, MemoryLocation::CpuToGpu)?;
-        staging.mapped()[..bytes.len()].copy_from_slice(bytes);
-        let spec = ImageSpec {
-            format: vk::Format::R32G32B32A32_SFLOAT,
-            size,
-            layers: 1,
-            array: false,
-            usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
-        };
-        let image = match Image::new(&self.host, Id::Environment.name(), &spec) {
-            Ok(image) => image,
-            Err(e) => {
-                staging.destroy(&self.host);
-                return Err(e);
-            }
-        };
-        let mut state = access::State::default();
-        for access in [access::Access::TransferWrite, access::Access::FragmentRead] {
-            if let Some(b) = state.step(access, true) {
-                let barrier = b.on_image(image.handle, image.aspect);
-                let info = vk::DependencyInfo::default().image_memory_barriers(std::slice::from_ref(&barrier));
-                // SAFETY: `cmd` is recording (this function's contract); the image is new.
-                unsafe { self.host.device.cmd_pipeline_barrier2(cmd, &info) };
-            }
-            if access == access::Access::TransferWrite {
-                let layers =
-                    vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
-                let extent = vk::Extent3D { width: size[0], height: size[1], depth: 1 };
-                let copy = vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent);
-                let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-                // SAFETY: as above; the staging buffer holds exactly this image.
-                unsafe {
-                    self.host.device.cmd_copy_buffer_to_image(cmd, staging.handle, image.handle, layout, &[copy])
-                };
-            }
-        }
-        self.retire(Resource::Buffer(staging));
-        if let Some(old) = self.environment.replace(image) {
-            self.retire(Resource::Image(old));
-        }
-        Ok(())
-    }
-
     /// Keeps something that recorded commands may still use until the next frame has completed: uploads and copies
     /// that were recorded since the last frame run before that one.
     fn retire(&mut self, resource: Resource) {
@@ -378,6 +254,7 @@ impl Renderer {
         let Some(slot) = self.slots.get_mut(input.slot) else {
             return Err(Error::parameter("slot", input.slot, "use less than Host::frames_in_flight"));
         };
+        check_memory(&self.host, &self.limits, &self.table, &needs)?;
         // The slot's last frame has completed, and with it every frame before.
         self.retired.collect(&self.host, slot.frame);
         self.frame += 1;
@@ -536,20 +413,17 @@ impl Renderer {
     }
 }
 
-/// No device asks for more alignment of a storage buffer's offset.
-const BINDING_ALIGNMENT: u64 = 256;
-/// Three arrays of three floats each hold the particles (glsl/include/particles.glsl).
-const PARTICLE_ARRAYS: [Id; 3] = [Id::Centers, Id::Diagonals, Id::Mixed];
-const ARRAY_BYTES: u64 = 12;
-/// Where indices of three floats each, or of a rectangle of work groups, would no longer fit 32 bits.
-const MOST_PARTICLES: u64 = 1 << 30;
-
-/// A particle as shaders read it; `axes` in particle radii.
-pub fn pack(center: Vec3, axes: Mat3) -> shader::Particle {
-    let s = axes * axes.transpose();
-    shader::Particle {
-        center: center.extend(0.0),
-        shape_diagonal: Vec4::new(s.x_axis.x, s.y_axis.y, s.z_axis.z, 0.0),
-        shape_mixed: Vec4::new(s.y_axis.x, s.z_axis.x, s.z_axis.y, 0.0),
+/// Refuses a frame that does not fit the device, before anything is made for it.
+fn check_memory(host: &Host, limits: &Limits, table: &Table, needs: &Needs) -> Result<(), Error> {
+    if table.fits(needs) {
+        return Ok(());
+    }
+    let needed: u64 = targets::ledger(&host.device, needs).iter().map(|e| e.bytes).sum();
+    match needed.checked_sub(limits.memory) {
+        None | Some(0) => Ok(()),
+        Some(missing) => Err(Error::MemoryShort { needed, available: limits.memory, missing }),
     }
 }
+
+/// No device asks for more alignment of a storage buffer's offset.
+const BINDING_ALIGNMENT: u64 = 256;

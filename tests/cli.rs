@@ -129,6 +129,63 @@ fn stats_and_dump_are_complete() {
 }
 
 #[test]
+fn particles_are_prepared_on_the_device_as_on_the_cpu() {
+    let run = Run::new();
+    let particles = |prepare: &str| {
+        run.render(&["--prepare", prepare, "--stats", "stats.json", "--dump", prepare]);
+        let stats: serde_json::Value =
+            serde_json::from_slice(&fs::read(run.path("stats.json")).expect("stats")).expect("JSON");
+        assert!(run.path(prepare).join("particles.npz").exists());
+        let guards = ["few_neighbours", "degenerate"].map(|g| stats["guards"][format!("ellipsoid_{g}")].clone());
+        let passes = stats["gpu"]["passes"].as_array().expect("passes").iter();
+        let on_device = passes.filter(|p| ["extent", "sort", "shape"].map(Some).contains(&p["pass"].as_str())).count();
+        (stats["particles"]["splash"].clone(), stats["particles"]["body"].clone(), guards, on_device)
+    };
+    let (cpu, gpu, relation) = (particles("cpu"), particles("gpu"), particles("gpu-relation"));
+    assert!(cpu.1.as_u64() > Some(20_000) && cpu.3 == 0 && gpu.3 == 3 && relation.3 == 3);
+    assert_eq!((&cpu.0, &cpu.1, &cpu.2), (&gpu.0, &gpu.1, &gpu.2));
+    assert_eq!((&cpu.0, &cpu.1, &cpu.2), (&relation.0, &relation.1, &relation.2));
+}
+
+#[test]
+fn bench_writes_figures_and_refuses_validation() {
+    let run = Run::new();
+    let csv = run.file("cloud.csv", block(0.0));
+    let small = ["--size", "64x48", "--frames", "2", "--warmup", "1"];
+    let bench = |more: &[&str]| run.command(&[&["bench"], &small[..], more].concat());
+    let done = bench(&[&csv, "--scaling", "--max-particles", "10000", "-o", "bench.json"]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let figures: serde_json::Value =
+        serde_json::from_slice(&fs::read(run.path("bench.json")).expect("written")).expect("JSON");
+    assert_eq!(figures["runs"].as_array().map(Vec::len), Some(3), "the file and two blocks");
+    for r in figures["runs"].as_array().expect("runs") {
+        let ms = |what: &str, q: &str| r[what][q].as_f64().expect("a number");
+        assert!(ms("frame_span", "p5_ms") > 0.0 && ms("frame_span", "p5_ms") <= ms("frame_span", "p95_ms"));
+        assert!(ms("sum_of_passes", "median_ms") <= 1.01 * ms("frame_span", "median_ms"));
+        assert!(ms("preparation", "median_ms") > 0.0);
+    }
+    assert!(figures["runs"][2]["bytes_per_particle"].as_f64().expect("a number") <= 96.0);
+    assert!(figures["growth"]["exponent"].as_f64().is_some());
+    for key in ["device", "protocol", "commit", "command"] {
+        assert!(!figures[key].is_null(), "{key}");
+    }
+    assert!(bench(&[&csv, "-o", "bench.csv"]).status.success());
+    let table = fs::read_to_string(run.path("bench.csv")).expect("written");
+    assert!(table.starts_with("scene,particles,pass,median_ms") && table.contains(",shape,"), "{table}");
+
+    run.refused(1, &["bench", &csv, "-o", "bench.txt"], &["bench.txt", ".json"]);
+    run.refused(1, &["bench", "missing.vtk"], &["missing.vtk"]);
+    run.refused(2, &["bench", "--frames", "0"], &["frames"]);
+    let output = Command::new(env!("CARGO_BIN_EXE_meniscus"))
+        .args(["bench", &csv])
+        .env("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation")
+        .output()
+        .expect("meniscus starts");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && text.contains("validation is on"), "{text}");
+}
+
+#[test]
 fn only_what_a_scene_needs_is_there() {
     let run = Run::new();
     let block = run.file("block.csv", block(0.0));

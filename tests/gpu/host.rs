@@ -6,6 +6,7 @@ use glam::Vec3;
 use meniscus::{
     Equirect, FrameInput, Particles, Renderer, SceneInput, Settings,
     host::{Canvas, Gpu},
+    prepare::DevicePositions,
     targets::Needs,
     twin::optics::srgb_byte,
 };
@@ -234,6 +235,29 @@ fn what_the_caller_gets_wrong_is_said() {
             let mut flat = case.clone();
             flat.camera.near = 0.0;
             assert!(refused(&input(&flat, 0, canvas.view)).contains("near plane"));
+            // Positions on the device. Nothing is recorded, so their buffer need not be there.
+            let positions = DevicePositions {
+                buffer: vk::Buffer::null(),
+                offset: 0,
+                stride: 12,
+                count: 10,
+                radius: 0.1,
+                options: Default::default(),
+                keep_class_below: None,
+            };
+            let far_too_many = u32::try_from(u64::from(u32::MAX) / 2).expect("it fits");
+            for (wrong, word) in [
+                (DevicePositions { offset: 6, ..positions }, "offset of positions is 6"),
+                (DevicePositions { stride: 8, ..positions }, "stride of positions is 8"),
+                (DevicePositions { stride: 13, ..positions }, "stride of positions is 13"),
+                (DevicePositions { radius: -1.0, ..positions }, "particle radius is -1"),
+                (DevicePositions { keep_class_below: Some(f32::NAN), ..positions }, "upper splash threshold"),
+                (DevicePositions { count: far_too_many, ..positions }, "particles is 2147483647"),
+            ] {
+                let input = FrameInput { positions: Some(wrong), ..input(&case, 0, canvas.view) };
+                let said = refused(&input);
+                assert!(said.contains(word), "{said}");
+            }
             // SAFETY: a new renderer on the same device; refused or destroyed at once.
             let other = unsafe { Renderer::new(gpu.host(1), vk::Format::R32G32_UINT) };
             assert!(other.err().expect("no colour attachment").to_string().contains("R32G32_UINT"));
