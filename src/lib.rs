@@ -15,7 +15,10 @@
 //!   then, and destroyed without waiting.
 //! * The output image is in `COLOR_ATTACHMENT_OPTIMAL` before and after; it is written as a colour attachment.
 //!   The host makes it available before, and makes it visible afterwards.
-//! * The same input gives the same bits on the same driver, in whatever order the particles come.
+//! * Particles are prepared on the host ([`prepare::prepare`], [`Renderer::set_particles`]) or, frame by frame, on the device
+//!   from positions in a buffer of the host's ([`prepare::DevicePositions`]): then no count ever comes back, and what a
+//!   scene does not need is an indirect draw or dispatch of nothing.
+//! * The same input gives the same bits on the same driver; prepared on the host, in whatever order the particles come.
 //!
 //! # Spaces and units
 //!

@@ -222,6 +222,8 @@ impl Renderer {
     /// * `cmd` is recording, outside rendering, and goes to a queue of the family in [`Host`], after all frames
     ///   recorded before it.
     /// * The frame last recorded into `input.slot` has completed on the device.
+    /// * The buffer of [`FrameInput::positions`] is alive until the frame has completed, holds what is said of it, has
+    ///   usage `STORAGE_BUFFER`, and its earlier writes are visible to reads in compute shaders.
     /// * The output and the scene's images are alive, of this size, in the stated layouts, and their earlier writes
     ///   are available to the fragment and colour-attachment stages.
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, input: &FrameInput) -> Result<(), Error> {

@@ -52,6 +52,9 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     out.array("final_direction", 3, direction.chunks_exact(4).flat_map(|d| [d[0], d[1], d[2]]))?;
     out.array("color_linear", 3, session.picture()?.into_iter().flatten())?;
     particles(&folder.join("particles.npz"), job)?;
+    if job.args.dump_neighbours {
+        neighbours(&folder.join("neighbours.npz"), session)?;
+    }
     write_file(&folder.join("frame.json"), serde_json::to_string_pretty(&frame(job))?.as_bytes())?;
     Ok(())
 }
@@ -109,6 +112,27 @@ fn particles(path: &Path, job: &Job) -> Result<()> {
     add("axes", &[n, 3, 3], p.ellipsoids.iter().flat_map(|e| e.axes.as_dmat3().to_cols_array()).collect())?;
     let mut w = npz.array("class", Default::default())?.default_dtype().shape(&[n]).begin_nd()?;
     w.extend((0..p.ellipsoids.len()).map(|i| u8::from(i >= p.splash_count)))?;
+    w.finish()?;
+    if let Some(index) = &job.index {
+        let mut w = npz.array("index", Default::default())?.default_dtype().shape(&[n]).begin_nd()?;
+        w.extend(index.iter().copied())?;
+        w.finish()?;
+    }
+    drop(npz); // writes the archive's directory
+    write_file(path, bytes.get_ref())?;
+    Ok(())
+}
+
+/// `offsets` (one more than particles) into `indices`, by index in the file.
+fn neighbours(path: &Path, session: &mut Session) -> Result<()> {
+    let (offsets, indices) = crate::prepared::neighbours(session)?;
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut npz = npyz::npz::NpzWriter::new(&mut bytes);
+    let mut w = npz.array("offsets", Default::default())?.default_dtype().shape(&[offsets.len() as u64]).begin_nd()?;
+    w.extend(offsets)?;
+    w.finish()?;
+    let mut w = npz.array("indices", Default::default())?.default_dtype().shape(&[indices.len() as u64]).begin_nd()?;
+    w.extend(indices)?;
     w.finish()?;
     drop(npz); // writes the archive's directory
     write_file(path, bytes.get_ref())?;

@@ -9,35 +9,40 @@ use meniscus::{
     targets::Id,
 };
 
-/// Particles as the last frame drew them, splashes first, and its counts; `before` without any.
-pub fn read(session: &mut Session, before: &Particles) -> Result<(Particles, Report), HostError> {
+/// What the last frame made of the positions.
+pub struct Prepared {
+    /// As drawn, splashes first.
+    pub particles: Particles,
+    pub report: Report,
+    /// Which of the positions each of them was.
+    pub index: Vec<u32>,
+}
+
+/// Reads it back; `radius` is the particles'.
+pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
+    let words = |session: &mut Session, id| Ok::<_, HostError>(session.words(id, 0)?.unwrap_or_default());
     let mut array = |id| {
-        let words = session.words(id, 0)?.unwrap_or_default();
-        Ok::<_, HostError>(
-            words
-                .chunks_exact(3)
-                .map(|w| Vec3::from_slice(&[w[0], w[1], w[2]].map(f32::from_bits)))
-                .collect::<Vec<_>>(),
-        )
+        let triple = |w: &[u32]| Vec3::from_slice(&[w[0], w[1], w[2]].map(f32::from_bits));
+        Ok::<_, HostError>(words(session, id)?.chunks_exact(3).map(triple).collect::<Vec<_>>())
     };
     let (centers, diagonals, mixed) = (array(Id::Centers)?, array(Id::Diagonals)?, array(Id::Mixed)?);
-    let radius = before.radius;
-    let (mut ellipsoids, mut body) = (Vec::new(), Vec::new());
-    for ((center, d), m) in centers.into_iter().zip(diagonals).zip(mixed).filter(|((_, d), _)| d.x != 0.0) {
-        let (e, n) = (d.abs().as_dvec3(), m.as_dvec3());
-        let shape = DMat3::from_cols(DVec3::new(e.x, n.x, n.y), DVec3::new(n.x, e.y, n.z), DVec3::new(n.y, n.z, e.z));
-        // The principal axes of S = A A^T are one A of many.
-        let (squares, frame) = eigen_symmetric(shape);
-        let axes = (frame * DMat3::from_diagonal(squares.max(DVec3::ZERO).map(f64::sqrt))).as_mat3() * radius;
-        let sphere = Mat3::from_diagonal(Vec3::splat(radius));
+    let sphere = Mat3::from_diagonal(Vec3::splat(radius));
+    let (mut splash, mut body) = (Vec::new(), Vec::new());
+    for (((center, d), m), index) in centers.into_iter().zip(diagonals).zip(mixed).zip(order(session)?) {
         if d.x < 0.0 {
-            ellipsoids.push(Ellipsoid { center, axes: sphere })
-        } else {
-            body.push(Ellipsoid { center, axes })
+            splash.push((Ellipsoid { center, axes: sphere }, index));
+        } else if d.x > 0.0 {
+            let (e, n) = (d.as_dvec3(), m.as_dvec3());
+            let shape =
+                DMat3::from_cols(DVec3::new(e.x, n.x, n.y), DVec3::new(n.x, e.y, n.z), DVec3::new(n.y, n.z, e.z));
+            // The principal axes of S = A A^T are one A of many.
+            let (squares, frame) = eigen_symmetric(shape);
+            let axes = (frame * DMat3::from_diagonal(squares.max(DVec3::ZERO).map(f64::sqrt))).as_mat3() * radius;
+            body.push((Ellipsoid { center, axes }, index));
         }
     }
-    let splash_count = ellipsoids.len();
-    ellipsoids.append(&mut body);
+    let splash_count = splash.len();
+    let (ellipsoids, index) = splash.into_iter().chain(body).unzip();
     let counters = session.words(Id::Counters, 0)?.unwrap_or_else(|| vec![0; s::COUNTERS as usize]);
     let count = |slot: u32| counters[slot as usize] as usize;
     let report = Report {
@@ -48,5 +53,37 @@ pub fn read(session: &mut Session, before: &Particles) -> Result<(Particles, Rep
         clamped_long: count(s::COUNT_CLAMPED_LONG),
         clamped_ratio: count(s::COUNT_CLAMPED_RATIO),
     };
-    Ok((Particles { radius, ellipsoids, splash_count }, report))
+    Ok(Prepared { particles: Particles { radius, ellipsoids, splash_count }, report, index })
+}
+
+/// Which position each particle of the device's arrays was.
+fn order(session: &mut Session) -> Result<Vec<u32>, HostError> {
+    let all = session.words(Id::Order, 0)?.unwrap_or_default();
+    let passes = session.words(Id::Extent, 0)?.map_or(0, |e| e[s::EXTENT_PASSES as usize] as usize);
+    let particles = session.words(Id::Visible, 0)?.map_or(0, |v| v.len());
+    let sorted = all.len() == 2 * particles && passes > 0;
+    // The relation table leaves particles in the order of the input.
+    Ok(if sorted { all[(passes & 1) * particles..][..particles].to_vec() } else { (0..particles as u32).collect() })
+}
+
+/// Neighbours of every position, in the order of the input: where each one's begin (one entry more than there are
+/// positions), and their indices, ascending.
+pub fn neighbours(session: &mut Session) -> Result<(Vec<u64>, Vec<u32>), Box<dyn std::error::Error>> {
+    let words = session.words(Id::Neighbours, 0)?.unwrap_or_default();
+    let room = (s::NEIGHBOUR_ROOM + 2) as usize;
+    let mut lists = vec![Vec::new(); words.len() / room];
+    for list in words.chunks_exact(room) {
+        let (index, number) = (list[0] as usize, list[1] as usize);
+        let Some(found) = list[2..].get(..number) else {
+            return Err(format!("particle {index} has {number} neighbours, and only {} can be listed", room - 2).into());
+        };
+        lists[index] = found.to_vec();
+        lists[index].sort_unstable();
+    }
+    let mut offsets = vec![0];
+    offsets.extend(lists.iter().scan(0, |sum, l| {
+        *sum += l.len() as u64;
+        Some(*sum)
+    }));
+    Ok((offsets, lists.concat()))
 }

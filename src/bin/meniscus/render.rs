@@ -95,6 +95,9 @@ pub struct Args {
     /// Write every intermediate target as .npy into this folder
     #[arg(long, value_name = "DIR")]
     pub dump: Option<PathBuf>,
+    /// With --dump and --prepare gpu: also write every particle's neighbours (four kibibytes of device memory a particle)
+    #[arg(long, requires = "dump")]
+    pub dump_neighbours: bool,
     /// Run with core and synchronization validation; any message is an error
     #[arg(long)]
     pub validate: bool,
@@ -133,6 +136,8 @@ pub struct Job<'a> {
     /// As drawn.
     pub particles: Particles,
     pub report: Report,
+    /// Which of the file's positions each particle was, where the device prepared them.
+    pub index: Option<Vec<u32>>,
     pub camera: Camera,
     pub eye: Vec3,
     pub settings: Settings,
@@ -145,6 +150,9 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     images::check_extension(&args.output)?;
     for path in [Some(&args.output), args.stats.as_ref()].into_iter().flatten() {
         images::check_folder(path)?;
+    }
+    if args.dump_neighbours && !args.prepare.on_device() {
+        return Err("--dump-neighbours lists what the device finds: add --prepare gpu".into());
     }
     let environment = args.env.as_deref().map_or_else(|| Ok(Equirect::procedural_sky()), images::read_environment)?;
     let instance = Instance::new(args.validate)?;
@@ -236,6 +244,7 @@ fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::er
         scene,
         particles: scene.particles.clone(),
         report: scene.report,
+        index: None,
         camera,
         eye,
         settings,
@@ -275,9 +284,11 @@ fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error
     }
     let memory = session.renderer.memory();
     input.debug = true;
+    input.neighbours = job.args.dump_neighbours;
     session.frame(&input)?;
     if job.args.prepare.on_device() {
-        (job.particles, job.report) = prepared::read(session, &job.scene.particles)?;
+        let prepared = prepared::read(session, job.particles.radius)?;
+        (job.particles, job.report, job.index) = (prepared.particles, prepared.report, Some(prepared.index));
     }
     if let Some(folder) = &job.args.dump {
         dump::write(folder, job, session)?;
