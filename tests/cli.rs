@@ -176,6 +176,8 @@ fn bench_writes_figures_and_refuses_validation() {
     run.refused(1, &["bench", &csv, "-o", "bench.txt"], &["bench.txt", ".json"]);
     run.refused(1, &["bench", "missing.vtk"], &["missing.vtk"]);
     run.refused(2, &["bench", "--frames", "0"], &["frames"]);
+    run.refused(1, &["bench", "--scaling", "--max-particles", "10"], &["--max-particles 10", "1000"]);
+    run.refused(1, &["render", &csv, "-o", "out.png", "--dump", "d", "--dump-neighbours"], &["--prepare gpu"]);
     let output = Command::new(env!("CARGO_BIN_EXE_meniscus"))
         .args(["bench", &csv])
         .env("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation")

@@ -1,12 +1,12 @@
 //! The contract with the host: frames in flight, replaced resources, host scenes, output formats.
 
-use crate::support::{Case, Driver, camera, each_driver, random_cloud, sphere};
+use crate::support::{Case, Cloud, Driver, camera, each_driver, random_cloud, sphere};
 use ash::vk;
 use glam::Vec3;
 use meniscus::{
-    Equirect, FrameInput, Particles, Renderer, SceneInput, Settings,
-    host::{Canvas, Gpu},
-    prepare::DevicePositions,
+    Equirect, Error, FrameInput, Particles, Renderer, SceneInput, Settings,
+    host::{Canvas, Gpu, Upload},
+    prepare::{DevicePositions, Search},
     targets::Needs,
     twin::optics::srgb_byte,
 };
@@ -56,6 +56,60 @@ fn input<'a>(case: &'a Case, slot: usize, output: vk::ImageView) -> FrameInput<'
     }
 }
 
+/// The picture in a canvas is the expected one. The debug variant that `shoot` draws with is another program, which may
+/// round otherwise.
+fn assert_shows(canvas: &Canvas, expected: &[[f32; 3]], what: &str) {
+    let words = canvas.read().expect("picture");
+    let float = |p: &[u8], o: usize| f32::from_ne_bytes([p[o], p[o + 1], p[o + 2], p[o + 3]]);
+    let found = words.chunks_exact(16).flat_map(|p| [0, 4, 8].map(|o| float(p, o)));
+    let differ = |(a, b): &(&f32, f32)| (*a - b).abs() > 1e-3 * a.abs().max(0.1);
+    let differ = expected.iter().flatten().zip(found).filter(differ).count();
+    assert!(differ * 100 < 3 * expected.len(), "{what}: {differ} values differ");
+}
+
+#[test]
+fn two_frames_in_flight_from_positions_on_the_device() {
+    each_driver(|driver| {
+        with_renderer(driver, vk::Format::R32G32B32A32_SFLOAT, 2, |gpu, renderer| {
+            let cloud = |i: u64, n: usize| random_cloud(i, 0.1, Vec3::splat(-0.6), Vec3::splat(0.6), 0, n);
+            let canvas = || Canvas::new(gpu, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE).expect("canvas");
+            let canvases = [canvas(), canvas()];
+            // Two buffers in turns, other particles and another number of them in each; between them a frame without.
+            for pair in 0..2u64 {
+                let clouds = [cloud(pair, 700), cloud(10 + pair, 200 + 900 * pair as usize)]
+                    .map(|c| c.ellipsoids.iter().map(|e| e.center).collect::<Vec<_>>());
+                let uploads = clouds.each_ref().map(|c| Upload::new(gpu, bytemuck::cast_slice(c)).expect("upload"));
+                let case = case(cloud(20, 30));
+                renderer.set_particles(&case.particles).expect("particles");
+                gpu.run(|cmd| {
+                    for slot in 0..2 {
+                        let canvas = &canvases[slot];
+                        canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+                        let positions = DevicePositions {
+                            buffer: uploads[slot].buffer,
+                            offset: 0,
+                            stride: 12,
+                            count: clouds[slot].len() as u32,
+                            radius: 0.1,
+                            options: Default::default(),
+                            keep_class_below: None,
+                        };
+                        let input = FrameInput { positions: Some(positions), ..input(&case, slot, canvas.view) };
+                        // SAFETY: `cmd` is recording outside rendering; the slot's last frame was waited for by `run`.
+                        unsafe { renderer.record(cmd, &input) }?;
+                    }
+                    Ok(())
+                })
+                .expect("frames");
+                for (slot, canvas) in canvases.iter().enumerate() {
+                    let alone = driver.shoot_cloud(&case, &Cloud::new(&clouds[slot], Search::Runs));
+                    assert_shows(canvas, &alone.picture, &format!("{}: pair {pair}, slot {slot}", driver.name));
+                }
+            }
+        });
+    });
+}
+
 #[test]
 fn two_frames_in_flight_with_everything_replaced_between() {
     each_driver(|driver| {
@@ -86,16 +140,7 @@ fn two_frames_in_flight_with_everything_replaced_between() {
                     let mut alone = clouds[2 * pair + slot].clone();
                     alone.settings.refractions = [4, 1][slot];
                     alone.settings.iterations = 1 + slot as u32;
-                    let expected: Vec<f32> = driver.shoot(&alone).picture.into_iter().flatten().collect();
-                    let words = canvas.read().expect("picture");
-                    let found: Vec<f32> = words
-                        .chunks_exact(16)
-                        .flat_map(|p| [0, 4, 8].map(|o| f32::from_ne_bytes([p[o], p[o + 1], p[o + 2], p[o + 3]])))
-                        .collect();
-                    // The debug variant that `shoot` draws with is another program, which may round otherwise.
-                    let differ =
-                        expected.iter().zip(&found).filter(|(a, b)| (*a - *b).abs() > 1e-3 * a.abs().max(0.1)).count();
-                    assert!(differ * 100 < found.len(), "{}: slot {slot}: {differ} values differ", driver.name);
+                    assert_shows(canvas, &driver.shoot(&alone).picture, &format!("{}: slot {slot}", driver.name));
                 }
                 assert!(renderer.times(0).is_some() && renderer.times(1).is_some(), "{}: no times", driver.name);
             }
@@ -257,6 +302,21 @@ fn what_the_caller_gets_wrong_is_said() {
                 let input = FrameInput { positions: Some(wrong), ..input(&case, 0, canvas.view) };
                 let said = refused(&input);
                 assert!(said.contains(word), "{said}");
+            }
+            // CPU drivers have 2 GiB for the four gigabytes of such a frame: refused before anything is made.
+            renderer.resize([8192, 8192]).expect("a size that images have");
+            let both = random_cloud(1, 0.1, Vec3::splat(-0.5), Vec3::splat(0.5), 5, 30);
+            renderer.set_particles(&both).expect("particles");
+            let before = renderer.memory().len();
+            let short = gpu.run(|cmd| {
+                // SAFETY: refused before anything is recorded.
+                Ok(unsafe { renderer.record(cmd, &input(&case, 0, canvas.view)) }.unwrap_err())
+            });
+            match short.expect("an empty command buffer") {
+                Error::MemoryShort { needed, available, missing } => {
+                    assert!(needed == available + missing && missing > 0 && renderer.memory().len() == before);
+                }
+                other => panic!("{}: {other}", driver.name),
             }
             // SAFETY: a new renderer on the same device; refused or destroyed at once.
             let other = unsafe { Renderer::new(gpu.host(1), vk::Format::R32G32_UINT) };

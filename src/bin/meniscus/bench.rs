@@ -92,7 +92,10 @@ impl Run {
     /// Bytes that grow with the number of particles, for each of them; the positions' own 12 included.
     pub fn bytes_per_particle(&self, on_device: bool) -> f64 {
         let bytes: u64 = self.memory.iter().filter(|e| PER_PARTICLE.contains(&e.name)).map(|e| e.bytes).sum();
-        bytes as f64 / self.particles.max(1) as f64 + if on_device { 12.0 } else { 0.0 }
+        if self.particles == 0 {
+            return 0.0;
+        }
+        bytes as f64 / self.particles as f64 + if on_device { 12.0 } else { 0.0 }
     }
 }
 
@@ -109,6 +112,9 @@ const PER_PARTICLE: [&str; 9] = [
     "drawn particles",
 ];
 
+/// Particles of the blocks of `--scaling`.
+const SIZES: [u32; 6] = [1_000, 10_000, 100_000, 1_000_000, 4_000_000, 10_000_000];
+
 /// Seed of the built-in scenes.
 pub const SEED: u64 = 1;
 
@@ -116,6 +122,9 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     if let Some(path) = &args.output {
         report::check_extension(path)?;
         images::check_folder(path)?;
+    }
+    if args.scaling && args.files.is_empty() && !args.scenes && args.max_particles < SIZES[0] {
+        return Err(format!("--max-particles {} leaves no block: use {} or more", args.max_particles, SIZES[0]).into());
     }
     let instance = Instance::new(false)?;
     let device = instance.pick(args.device.as_deref())?;
@@ -173,7 +182,7 @@ fn all(args: &Args, settings: &Settings, session: &mut Session) -> Result<Vec<Ru
         add("20,000 droplets".into(), Scene::synthetic(droplets(20_000), RADIUS, args.prepare)?)?;
     }
     if args.scaling {
-        for n in [1_000, 10_000, 100_000, 1_000_000, 4_000_000, 10_000_000] {
+        for n in SIZES {
             if n <= args.max_particles {
                 add(format!("block of {n}"), Scene::synthetic(block(n), RADIUS, args.prepare)?)?;
             }
