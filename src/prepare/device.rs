@@ -70,7 +70,12 @@ impl DevicePositions {
                 o.max_semi_axis,
                 lattice_variance(scale.reach() / scale.radius) as f32,
             ),
-            options: UVec4::new(u32::try_from(o.min_neighbours).unwrap_or(u32::MAX - 1), 0, 0, (2.0 / supports) as u32),
+            options: UVec4::new(
+                u32::try_from(o.min_neighbours).unwrap_or(u32::MAX).min(u32::MAX - 1),
+                0,
+                0,
+                (2.0 / supports) as u32,
+            ),
         })
     }
 }
