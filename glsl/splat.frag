@@ -1,7 +1,4 @@
 // The nearest front or farthest back of a class of particles: exact ray cast of each ellipsoid (Sigg06).
-//
-// A point of the pixel's ray at depth dc + s is q + s v from the centre, q = dc v - c its offset at the centre's depth, and
-// (q + s v)^T G (q + s v) = 1 is quadratic in s with coefficients of order one.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
@@ -15,14 +12,10 @@ layout(location = 2) flat in vec3 g_mixed;
 layout(location = 0) out float out_depth; // linear depth; negative where the near plane lies inside this particle
 layout(location = 1) out uint out_normal; // outward, eye space
 
-vec3 times_g(vec3 a) { return times_shape(g_diagonal, g_mixed, a); }
-
 void main() {
     vec3 v = view_ray(gl_FragCoord.xy);
-    vec3 q = vec3(center.z * v.xy - center.xy, 0.0);
-    vec3 gv = times_g(v), gq = times_g(q);
-    float a = dot(v, gv), b = dot(v, gq), c = dot(q, gq) - 1.0;
-    float discriminant = b * b - a * c;
+    vec3 q;
+    float a, b, discriminant = quadratic(Cast(center, g_diagonal, g_mixed), v, q, a, b);
     if (discriminant < 0.0) discard;
     float root = sqrt(discriminant), near = frame.viewport.z;
     bool back = splat.what.y == SIDE_BACK;
@@ -30,7 +23,7 @@ void main() {
     if (far_depth < near) discard;
     float s = back ? (root - b) / a : (-root - b) / a;
     float depth = center.z + s;
-    out_normal = encode_normal(normalize(times_g(q + s * v)));
+    out_normal = encode_normal(normalize(times_shape(g_diagonal, g_mixed, q + s * v)));
     out_depth = depth;
     if (depth < near) {
         // The ray starts inside this particle: nothing can be in front of that.

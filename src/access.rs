@@ -104,6 +104,19 @@ impl Barrier {
             .image(image)
             .subresource_range(whole(aspect))
     }
+
+    /// The barrier for a whole buffer; layouts mean nothing to it.
+    pub(crate) fn on_buffer(&self, buffer: vk::Buffer) -> vk::BufferMemoryBarrier2<'static> {
+        vk::BufferMemoryBarrier2::default()
+            .src_stage_mask(self.src.0)
+            .src_access_mask(self.src.1)
+            .dst_stage_mask(self.dst.0)
+            .dst_access_mask(self.dst.1)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .buffer(buffer)
+            .size(vk::WHOLE_SIZE)
+    }
 }
 
 impl State {

@@ -51,8 +51,6 @@ pub struct Limits {
     pub timestamp_period: Option<f32>,
     /// Valid bits of a timestamp.
     pub timestamp_mask: u64,
-    /// Most work groups of one dispatch along x.
-    pub groups: u32,
     /// Largest storage buffer in bytes.
     pub storage_size: u64,
     /// Largest device-local heap in bytes.
@@ -124,7 +122,6 @@ impl Host {
             image_size: properties.limits.max_image_dimension2_d.min(properties.limits.max_framebuffer_width),
             timestamp_period: (bits > 0).then_some(properties.limits.timestamp_period),
             timestamp_mask: if bits >= 64 { u64::MAX } else { (1u64 << bits) - 1 },
-            groups: properties.limits.max_compute_work_group_count[0],
             storage_size: u64::from(properties.limits.max_storage_buffer_range),
             memory: local.map(|h| h.size).max().unwrap_or(0),
         }

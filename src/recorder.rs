@@ -187,7 +187,7 @@ impl Recorder<'_> {
             if u.id == Id::FrameBlock {
                 if let Some(barrier) = self.frame_block.step(u.access, false) {
                     self.plan.push(PlanEntry { pass, resource: u.id.name(), barrier });
-                    buffers.push(on_buffer(&barrier, self.externals.frame_block));
+                    buffers.push(barrier.on_buffer(self.externals.frame_block));
                 }
                 continue;
             }
@@ -197,7 +197,7 @@ impl Recorder<'_> {
             self.plan.push(PlanEntry { pass, resource: u.id.name(), barrier });
             match &entry.resource {
                 Resource::Image(image) => images.push(barrier.on_image(image.handle, image.aspect)),
-                Resource::Buffer(buffer) => buffers.push(on_buffer(&barrier, buffer.handle)),
+                Resource::Buffer(buffer) => buffers.push(barrier.on_buffer(buffer.handle)),
             }
         }
         if images.is_empty() && buffers.is_empty() {
@@ -359,17 +359,4 @@ impl Recorder<'_> {
             _ => panic!("a pass asks for the image {:?}, which this frame does without", u.id),
         }
     }
-}
-
-/// The barrier for a whole buffer.
-fn on_buffer(barrier: &Barrier, buffer: vk::Buffer) -> vk::BufferMemoryBarrier2<'static> {
-    vk::BufferMemoryBarrier2::default()
-        .src_stage_mask(barrier.src.0)
-        .src_access_mask(barrier.src.1)
-        .dst_stage_mask(barrier.dst.0)
-        .dst_access_mask(barrier.dst.1)
-        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-        .buffer(buffer)
-        .size(vk::WHOLE_SIZE)
 }

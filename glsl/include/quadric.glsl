@@ -89,12 +89,22 @@ Cast cast_of(Ellipsoid e) {
     return c;
 }
 
+// A point of the pixel's ray at depth dc + s is q + s v from the centre, q = dc v - c its offset at the centre's depth, and
+// (q + s v)^T G (q + s v) = 1 is quadratic in s, a s^2 + 2 b s + c = 0, with coefficients of order one. Returns b^2 - a c.
+float quadratic(Cast c, vec3 v, out vec3 q, out float a, out float b) {
+    q = vec3(c.center.z * v.xy - c.center.xy, 0.0);
+    vec3 gv = times_shape(c.diagonal, c.mixed_part, v), gq = times_shape(c.diagonal, c.mixed_part, q);
+    a = dot(v, gv);
+    b = dot(v, gq);
+    return b * b - a * (dot(q, gq) - 1.0);
+}
+
 // Depths at which a pixel's ray enters and leaves, as splat.frag has them but for rounding. Where rounding could decide
 // whether the ray hits at all, `slack` does: 1 says it does, -1 that it does not.
 bool hits(Cast c, vec2 pixel, float slack, out float nearer, out float farther) {
-    vec3 v = view_ray(pixel), q = vec3(c.center.z * v.xy - c.center.xy, 0.0);
-    float a = dot(v, times_shape(c.diagonal, c.mixed_part, v)), b = dot(v, times_shape(c.diagonal, c.mixed_part, q));
-    float discriminant = b * b - a * (dot(q, times_shape(c.diagonal, c.mixed_part, q)) - 1.0);
+    float a, b;
+    vec3 q, v = view_ray(pixel);
+    float discriminant = quadratic(c, v, q, a, b);
     discriminant += slack * SILHOUETTE * (b * b + a);
     float root = sqrt(max(discriminant, 0.0));
     nearer = c.center.z - (root + b) / a;

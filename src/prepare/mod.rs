@@ -1,7 +1,8 @@
 //! From simulated particles to what is drawn: spheres for splashes, ellipsoids for the body.
 //!
-//! This is the CPU's way, once for each frame of particles, and the twin of the GPU's ([`DevicePositions`]). The result depends on the set of
-//! particles alone: a shuffled input gives bit-identical output, on any number of threads.
+//! This is the CPU's way, once for each frame of particles, and the twin of the GPU's
+//! ([`DevicePositions`]). The result depends on the set of particles alone: a shuffled input gives
+//! bit-identical output, on any number of threads.
 
 pub mod density;
 mod device;

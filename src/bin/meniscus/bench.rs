@@ -13,11 +13,7 @@ use meniscus::{
     profile::FrameTimes,
     targets::LedgerEntry,
 };
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::{collections::BTreeMap, path::PathBuf, process::ExitCode};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -289,9 +285,4 @@ fn measure(
         sum: frames.iter().map(|f| f.passes.iter().map(|p| p.ms).sum()).collect(),
         memory: session.renderer.memory(),
     })
-}
-
-/// Whether figures can be written there.
-pub fn extension(path: &Path) -> Option<&str> {
-    path.extension().and_then(|e| e.to_str())
 }

@@ -1,6 +1,6 @@
 //! The figures of `meniscus bench`: on the terminal, as JSON, as CSV.
 
-use crate::bench::{Args, Run, SEED, extension};
+use crate::bench::{Args, Run, SEED};
 use meniscus::{Settings, host::DeviceInfo, io::images::write_file};
 use serde_json::{Value, json};
 use std::{error::Error, path::Path};
@@ -8,6 +8,11 @@ use std::{error::Error, path::Path};
 /// Commit this was built from.
 pub const COMMIT: &str = env!("MENISCUS_COMMIT");
 
+fn extension(path: &Path) -> Option<&str> {
+    path.extension().and_then(|e| e.to_str())
+}
+
+/// Refuses to write figures in a format that is not there.
 pub fn check_extension(path: &Path) -> Result<(), String> {
     match extension(path) {
         Some("json" | "csv") => Ok(()),
@@ -24,7 +29,7 @@ fn quantile(times: &[f64], share: f64) -> f64 {
     low + (high - low) * at.fract()
 }
 
-pub fn median(times: &[f64]) -> f64 {
+fn median(times: &[f64]) -> f64 {
     quantile(times, 0.5)
 }
 

@@ -52,6 +52,10 @@ impl Prepare {
     pub fn on_device(self) -> bool {
         self != Prepare::Cpu
     }
+
+    fn search(self) -> Search {
+        if self == Prepare::GpuRelation { Search::Relation } else { Search::Runs }
+    }
 }
 
 impl Scene {
@@ -99,7 +103,7 @@ impl Scene {
         let options = Options {
             support: file.support.map(|s| s as f32),
             splash_threshold: source.splash_threshold.unwrap_or(Options::default().splash_threshold),
-            search: if source.prepare == Prepare::GpuRelation { Search::Relation } else { Search::Runs },
+            search: source.prepare.search(),
             ..Options::default()
         };
         if source.prepare.on_device() && (classes.is_some() || axes.is_some()) {
@@ -133,11 +137,10 @@ impl Scene {
     }
 
     /// Positions that were made, not read.
-    pub fn synthetic(positions: Vec<Vec3>, radius: f32, where_: Prepare) -> Result<Scene, Box<dyn Error>> {
-        let search = if where_ == Prepare::GpuRelation { Search::Relation } else { Search::Runs };
-        let options = Options { search, ..Options::default() };
+    pub fn synthetic(positions: Vec<Vec3>, radius: f32, place: Prepare) -> Result<Scene, Box<dyn Error>> {
+        let options = Options { search: place.search(), ..Options::default() };
         let start = std::time::Instant::now();
-        let (particles, report) = if where_.on_device() {
+        let (particles, report) = if place.on_device() {
             (uniform(&positions, radius), Report::default())
         } else {
             prepare::prepare(&Input { positions: &positions, radius, classes: None, ellipsoids: None }, &options)?
