@@ -1,6 +1,7 @@
 // From neighbours to what is drawn: number density and class (Imai16 section 4.1), and for the body the ellipsoid of
-// YuTurk13. One invocation takes SHAPE_RUN particles that follow each other in the sorted order: where they share a cell,
-// they share its look-ups. Candidates are tested exactly, so that neighbours are the same set however they are found.
+// YuTurk13. One invocation takes SHAPE_RUN particles that follow each other in the sorted order, those of one column of cells
+// together, one a component: what is looked up and read once serves all. Candidates are tested exactly, so that neighbours are
+// the same set however they are found.
 //
 // Sorted cells: cells as wide as the support, so 5 x 5 runs of 5 cells. RELATION: one run of the relation table, whose
 // cells are as wide as the reach.
@@ -95,8 +96,8 @@ bool nearer(vec3 a, vec3 b) {
 }
 
 // The cubic spline without a branch: 2 (1 - q)^3 less 8 (1/2 - q)^3 where those are positive.
-float spline(float q) {
-    float far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
+vec4 spline(vec4 q) {
+    vec4 far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
     return 2.0 * far * far * far - 8.0 * near * near * near;
 }
 
@@ -124,26 +125,37 @@ void eigen(inout mat3 a, out mat3 v) {
     }
 }
 
-// What is summed over the neighbours of one particle, offsets measured from it.
+// A vector for each of the particles that are taken together.
+struct Vectors { vec4 x, y, z; };
+vec3 of(Vectors v, uint b) { return vec3(v.x[b], v.y[b], v.z[b]); }
+
+// What is summed over the neighbours of each, offsets measured from it.
 struct Sums {
-    uint number;
-    float density;
-    float weight;
-    vec3 first;
-    vec3 diagonal;
-    vec3 mixed_part;
+    uvec4 number;
+    vec4 density;
+    vec4 weight;
+    Vectors first;
+    Vectors diagonal;
+    Vectors mixed_part;
 };
 
 // Adds what is near; a choice of numbers costs less than a branch that neighbouring invocations take differently.
-void add(inout Sums s, bool near, vec3 o, float squared) {
-    o = near ? o : vec3(0.0);
-    float d = sqrt(near ? squared : prepare.lengths.w * prepare.lengths.w), q = d * (1.0 / prepare.lengths.w), w = near ? 1.0 - q * q * q : 0.0;
-    s.number += near ? 1u : 0u;
+void add(inout Sums s, bvec4 near, Vectors o, vec4 squared) {
+    vec4 d = sqrt(mix(vec4(prepare.lengths.w * prepare.lengths.w), squared, near));
+    vec4 q = d * (1.0 / prepare.lengths.w), w = mix(vec4(0.0), 1.0 - q * q * q, near);
+    s.number += uvec4(near);
     s.density += spline(d * (1.0 / prepare.lengths.z));
     s.weight += w;
-    s.first += w * o;
-    s.diagonal += w * o * o;
-    s.mixed_part += w * o.xxy * o.yzz;
+    vec4 x = w * o.x, y = w * o.y, z = w * o.z;
+    s.first.x += x;
+    s.first.y += y;
+    s.first.z += z;
+    s.diagonal.x += x * o.x;
+    s.diagonal.y += y * o.y;
+    s.diagonal.z += z * o.z;
+    s.mixed_part.x += x * o.y;
+    s.mixed_part.y += x * o.z;
+    s.mixed_part.z += y * o.z;
 }
 
 void write(uint k, vec3 center, vec3 diagonal, vec3 mixed_part) {
@@ -158,10 +170,10 @@ const uint LARGEST_RUNS = 25u;
 uint tally[COUNTERS - COUNT_SPLASH];
 void note(uint what) { ++tally[what - COUNT_SPLASH]; }
 
-// Class and ellipsoid of a particle from its sums.
-void finish(uint k, vec3 x, Sums s) {
+// Class and ellipsoid of particle k at x from its sums, those of component b.
+void finish(uint k, vec3 x, Sums s, uint b) {
     float radius = prepare.lengths.y;
-    float relative = s.density / prepare.classes.z;
+    float relative = s.density[b] / prepare.classes.z;
     bool body = relative >= prepare.classes.x;
     if (KEEP_CLASSES) {
         uint i = input_index(k);
@@ -174,13 +186,13 @@ void finish(uint k, vec3 x, Sums s) {
         return;
     }
     note(COUNT_BODY);
-    if (s.number <= prepare.options.x + 1u) {
+    if (s.number[b] <= prepare.options.x + 1u) {
         note(COUNT_FEW_NEIGHBOURS);
         write(k, x, vec3(1.0), vec3(0.0));
         return;
     }
-    vec3 mean = s.first / s.weight, d = s.diagonal / s.weight - mean * mean;
-    vec3 m = s.mixed_part / s.weight - mean.xxy * mean.yzz;
+    vec3 mean = of(s.first, b) / s.weight[b], d = of(s.diagonal, b) / s.weight[b] - mean * mean;
+    vec3 m = of(s.mixed_part, b) / s.weight[b] - mean.xxy * mean.yzz;
     // In radii, so that squares of lengths neither vanish nor overflow.
     float unit = 1.0 / (radius * radius);
     mat3 a = unit * mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z), v;
@@ -204,41 +216,48 @@ void finish(uint k, vec3 x, Sums s) {
 
 void main() {
     for (uint c = 0u; c < COUNTERS - COUNT_SPLASH; ++c) tally[c] = 0u;
-    uint from = min(invocation() * SHAPE_RUN, count()), to = min(from + SHAPE_RUN, count());
-    ivec3 cell = ivec3(0);
-    uvec2 runs[LARGEST_RUNS];
-    uint begins[LARGEST_RUNS];
-    uint number = 0u;
-    for (uint k = from; k < to; ++k) {
-        vec3 x = sorted_position(k);
+    uint next = min(invocation() * SHAPE_RUN, count()), to = min(next + SHAPE_RUN, count());
+    while (next < to) {
+        uint from = next++;
+        vec3 x = sorted_position(from);
         if (!finite(x)) {
-            write(k, vec3(0.0), vec3(0.0), vec3(0.0));
+            write(from, vec3(0.0), vec3(0.0), vec3(0.0));
             continue;
         }
-        ivec3 own = cell_of(x);
-        if (number == 0u || own != cell) {
-            // Further along the same columns, runs begin no earlier than they did.
-            bool along = number > 0u && own.xy == cell.xy && own.z > cell.z;
-            cell = own;
-            number = 0u;
-            if (RELATION) {
-                uint begin = search(cell, false, 0u);
-                runs[number++] = uvec2(begin, search(cell, true, begin));
-            } else {
-                int around = int(prepare.options.w);
-                uint begin = 0u, column = 0u;
-                for (int i = -around; i <= around; ++i) {
-                    for (int j = -around; j <= around; ++j) {
-                        if (along) begin = begins[column];
-                        uvec2 run = run_of(cell + ivec3(i, j, -around), cell + ivec3(i, j, around), begin);
-                        begins[column++] = run.x;
-                        begin = run.y;
-                        if (run.y > run.x) runs[number++] = run;
-                    }
+        // Those that follow in the same cell or the next: their candidates are nearly the same. Components without a particle
+        // of their own repeat the first and are not written.
+        Vectors p = Vectors(x.xxxx, x.yyyy, x.zzzz);
+        ivec3 cell = cell_of(x);
+        int top = cell.z;
+        for (uint b = 1u; b < SHAPE_RUN; ++b) {
+            if (RELATION || next == to) break;
+            x = sorted_position(next);
+            ivec3 own = cell_of(x);
+            if (!finite(x) || own.xy != cell.xy || own.z > cell.z + 1) break;
+            ++next;
+            top = own.z;
+            p.x[b] = x.x;
+            p.y[b] = x.y;
+            p.z[b] = x.z;
+        }
+        uvec2 runs[LARGEST_RUNS];
+        uint number = 0u;
+        if (RELATION) {
+            uint begin = search(cell, false, 0u);
+            runs[number++] = uvec2(begin, search(cell, true, begin));
+        } else {
+            int around = int(prepare.options.w);
+            uint begin = 0u;
+            for (int i = -around; i <= around; ++i) {
+                for (int j = -around; j <= around; ++j) {
+                    uvec2 run = run_of(cell + ivec3(i, j, -around), ivec3(cell.xy + ivec2(i, j), top + around), begin);
+                    begin = run.y;
+                    if (run.y > run.x) runs[number++] = run;
                 }
             }
         }
-        Sums s = Sums(0u, 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0));
+        Vectors none = Vectors(vec4(0.0), vec4(0.0), vec4(0.0));
+        Sums s = Sums(uvec4(0u), vec4(0.0), vec4(0.0), none, none, none);
         // One loop over all runs: invocations whose runs differ in length stay together.
         float limit = prepare.lengths.w * prepare.lengths.w;
         uint run = 0u, j = runs[0].x, end = runs[0].y;
@@ -249,21 +268,32 @@ void main() {
                 end = runs[run].y;
             }
             uint other = RELATION ? order_at(j) / 27u : j;
-            vec3 y = sorted_position(other), o = y - x;
-            float squared = dot(o, o);
-            bool near = squared < limit;
-            if (abs(squared - limit) <= 4e-6 * limit) near = nearer(x, y);
+            vec3 y = sorted_position(other);
+            Vectors o = Vectors(y.x - p.x, y.y - p.y, y.z - p.z);
+            vec4 squared = o.x * o.x + o.y * o.y + o.z * o.z;
+            bvec4 near = lessThan(squared, vec4(limit)), tie = lessThanEqual(abs(squared - limit), vec4(4e-6 * limit));
+            if (any(tie)) {
+                for (uint b = 0u; b < SHAPE_RUN; ++b) {
+                    if (tie[b]) near[b] = nearer(of(p, b), y);
+                }
+            }
 #ifdef NEIGHBOURS
-            if (near && s.number < NEIGHBOUR_ROOM) neighbours.at[k * (NEIGHBOUR_ROOM + 2u) + 2u + s.number] = input_index(other);
+            for (uint b = 0u; from + b < next; ++b) {
+                if (near[b] && s.number[b] < NEIGHBOUR_ROOM)
+                    neighbours.at[(from + b) * (NEIGHBOUR_ROOM + 2u) + 2u + s.number[b]] = input_index(other);
+            }
 #endif
             add(s, near, o, squared);
             ++j;
         }
+        for (uint b = 0u; b < SHAPE_RUN; ++b) {
+            if (from + b == next) break;
 #ifdef NEIGHBOURS
-        neighbours.at[k * (NEIGHBOUR_ROOM + 2u)] = input_index(k);
-        neighbours.at[k * (NEIGHBOUR_ROOM + 2u) + 1u] = s.number;
+            neighbours.at[(from + b) * (NEIGHBOUR_ROOM + 2u)] = input_index(from + b);
+            neighbours.at[(from + b) * (NEIGHBOUR_ROOM + 2u) + 1u] = s.number[b];
 #endif
-        finish(k, x, s);
+            finish(from + b, of(p, b), s, b);
+        }
     }
     for (uint c = 0u; c < COUNTERS - COUNT_SPLASH; ++c) {
         if (tally[c] > 0u) atomicAdd(counters.at[COUNT_SPLASH + c], tally[c]);

@@ -87,8 +87,8 @@
 #define DIGITS 32
 #define SORT_PASSES 20
 
-// Particles one invocation prepares in a row: neighbours in the sorted order share a cell, and its look-ups.
-#define SHAPE_RUN 8
+// Particles one invocation prepares, one a component of a vector.
+#define SHAPE_RUN 4
 
 // Below this share of the filled body's variance neighbours lie on one spot: their spread says nothing about a shape.
 #define DEGENERATE_SHARE 0.05

@@ -47,6 +47,11 @@ pub fn clouds() -> Vec<(&'static str, f32, Vec<Vec3>)> {
     wide.extend(scatter(300, Vec3::splat(-0.1), Vec3::splat(0.1)));
     let mut coincident = vec![Vec3::new(0.3, -0.2, 0.1); 300];
     coincident.extend(vec![Vec3::new(0.35, -0.2, 0.1); 40]);
+    // Distances that float32 rounds to either side of the reach, whichever of its invocation's particles the center is.
+    let center = Vec3::new(0.3, -0.2, 0.1);
+    let mut shell = vec![center; 9];
+    let directions = scatter(1200, Vec3::NEG_ONE, Vec3::ONE);
+    shell.extend(directions.iter().map(|d| (center.as_dvec3() + 0.4 * d.as_dvec3().normalize()).as_vec3()));
     vec![
         ("one", 0.05, vec![Vec3::new(0.3, 0.2, -0.7)]),
         ("two", 0.05, vec![Vec3::ZERO, Vec3::new(0.1, 0.0, 0.0)]),
@@ -56,6 +61,7 @@ pub fn clouds() -> Vec<(&'static str, f32, Vec<Vec3>)> {
         ("plane", 0.04, plane),
         ("lattice with ties", 0.0625, grid(6, 0.125)),
         ("coincident", 0.05, coincident),
+        ("a shell at the reach", 0.05, shell),
         ("a million away", 0.25, far(Vec3::new(1e6, -1e6, 1e6))),
         ("two millions wide", 0.01, wide),
     ]
