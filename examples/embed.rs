@@ -125,7 +125,7 @@ fn main() -> Result<()> {
                 output: s.view,
                 debug: false,
                 positions: None,
-                neighbours: false,
+                neighbours: 0,
             };
             renderer.record(s.cmd, &input)?;
             layout(&device, s, drawn, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);

@@ -20,6 +20,8 @@ layout(set = 0, binding = 8, std430) buffer CounterBlock { uint at[]; } counters
 layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_classes; // 0 splash, 1 body, by input index
 #ifdef NEIGHBOURS
 layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[]; } neighbours;
+// A particle's share: its index, how many neighbours it has, and those of them that there is room for.
+uint share() { return neighbours.at.length() / prepare.source.x; }
 #endif
 layout(constant_id = 0) const bool RELATION = false;
 layout(constant_id = 1) const bool KEEP_CLASSES = false;
@@ -222,6 +224,10 @@ void main() {
         vec3 x = sorted_position(from);
         if (!finite(x)) {
             write(from, vec3(0.0), vec3(0.0), vec3(0.0));
+#ifdef NEIGHBOURS
+            neighbours.at[from * share()] = input_index(from);
+            neighbours.at[from * share() + 1u] = 0u;
+#endif
             continue;
         }
         // Those that follow in the same cell or the next: their candidates are nearly the same. Components without a particle
@@ -279,8 +285,8 @@ void main() {
             }
 #ifdef NEIGHBOURS
             for (uint b = 0u; from + b < next; ++b) {
-                if (near[b] && s.number[b] < NEIGHBOUR_ROOM)
-                    neighbours.at[(from + b) * (NEIGHBOUR_ROOM + 2u) + 2u + s.number[b]] = input_index(other);
+                uint place = 2u + s.number[b];
+                if (near[b] && place < share()) neighbours.at[(from + b) * share() + place] = input_index(other);
             }
 #endif
             add(s, near, o, squared);
@@ -289,8 +295,8 @@ void main() {
         for (uint b = 0u; b < SHAPE_RUN; ++b) {
             if (from + b == next) break;
 #ifdef NEIGHBOURS
-            neighbours.at[(from + b) * (NEIGHBOUR_ROOM + 2u)] = input_index(from + b);
-            neighbours.at[(from + b) * (NEIGHBOUR_ROOM + 2u) + 1u] = s.number[b];
+            neighbours.at[(from + b) * share()] = input_index(from + b);
+            neighbours.at[(from + b) * share() + 1u] = s.number[b];
 #endif
             finish(from + b, of(p, b), s, b);
         }

@@ -55,9 +55,9 @@ pub struct FrameInput<'a> {
     pub output: vk::ImageView,
     /// Also write what each walk met into [`Id::Walk`] and [`Id::Direction`], for dumps and statistics.
     pub debug: bool,
-    /// Also list every particle's neighbours in [`Id::Neighbours`], where positions are prepared on the device: for each
-    /// its index, how many there are, and the indices of the first 1022. Four kibibytes a particle: for tests.
-    pub neighbours: bool,
+    /// Where positions are prepared on the device, also list so many neighbours of every particle in [`Id::Neighbours`]:
+    /// for each its index, how many there are, and the indices of the first of them; 0 lists none. For tests and dumps.
+    pub neighbours: u32,
 }
 
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
@@ -185,7 +185,7 @@ impl Renderer {
         settings: &Settings,
         positions: &DevicePositions,
         debug: bool,
-        neighbours: bool,
+        neighbours: u32,
     ) -> Result<Needs, Error> {
         let mut needs = self.needs(settings, debug);
         needs.count = positions.count;

@@ -138,8 +138,8 @@ pub struct Preparation {
     pub entries: u64,
     /// Whether classes are kept from frame to frame.
     pub keep_classes: bool,
-    /// Whether neighbours are listed, for tests: four kibibytes a particle.
-    pub neighbours: bool,
+    /// Neighbours of each particle that are listed, for tests.
+    pub neighbours: u32,
 }
 
 /// An image or a buffer, as it has to be made.
@@ -230,9 +230,9 @@ impl Needs {
             Id::Order => prepare.and_then(|p| buffer(8 * p.entries, B::empty())),
             Id::Sorted | Id::Centers | Id::Diagonals | Id::Mixed if prepare.is_some() => buffer(12 * count, B::empty()),
             Id::LastClasses if prepare.is_some_and(|p| p.keep_classes) => buffer(4 * count, B::empty()),
-            Id::Neighbours if prepare.is_some_and(|p| p.neighbours) => {
-                buffer(4 * u64::from(shader::NEIGHBOUR_ROOM + 2) * count, B::empty())
-            }
+            Id::Neighbours => prepare
+                .filter(|p| p.neighbours > 0)
+                .and_then(|p| buffer(4 * (2 + u64::from(p.neighbours)) * count, B::empty())),
             // Two 32-bit bounds a pixel: nearest and farthest depth that the body certainly reaches.
             Id::Bounds if body && self.occlusion => buffer(8 * pixels, B::empty()),
             // A word a particle: its class and the sides on which it shows.

@@ -147,6 +147,19 @@ fn particles_are_prepared_on_the_device_as_on_the_cpu() {
     assert_eq!((&cpu.0, &cpu.1, &cpu.2), (&relation.0, &relation.1, &relation.2));
 }
 
+/// However many neighbours there are, all of them are listed.
+#[test]
+fn neighbours_are_dumped() {
+    let run = Run::new();
+    let spot = run.file("spot.csv", "x,y,z\n".to_string() + &"0.1,0.2,0.3\n".repeat(400));
+    run.render(&[&spot, "--radius", "0.05", "--prepare", "gpu", "--dump", "d", "--dump-neighbours"]);
+    let mut npz = npyz::npz::NpzArchive::open(run.path("d/neighbours.npz")).expect("archive");
+    let offsets: Vec<u64> = npz.by_name("offsets").expect("read").expect("there").into_vec().expect("u64");
+    let indices: Vec<u32> = npz.by_name("indices").expect("read").expect("there").into_vec().expect("u32");
+    assert!(offsets.iter().enumerate().all(|(i, o)| *o == 400 * i as u64) && offsets.len() == 401, "{offsets:?}");
+    assert!(indices.chunks(400).all(|list| list.iter().copied().eq(0..400)));
+}
+
 #[test]
 fn bench_writes_figures_and_refuses_validation() {
     let run = Run::new();

@@ -93,9 +93,6 @@
 // Below this share of the filled body's variance neighbours lie on one spot: their spread says nothing about a shape.
 #define DEGENERATE_SHARE 0.05
 
-// Neighbours listed for each particle where they are asked for; before them its index and how many there are.
-#define NEIGHBOUR_ROOM 1022
-
 // Plane fitting: below this |n.v| eq. (5) is not trusted; an update longer than this many sigma is not taken.
 #define FIT_GRAZING_LIMIT 0.01
 #define FIT_UPDATE_LIMIT 4.0

@@ -49,7 +49,7 @@ fn a_frame_has_a_barrier_before_every_read() {
             output: vk::ImageView::null(),
             debug: true,
             positions: None,
-            neighbours: false,
+            neighbours: 0,
         };
         let mut plans = Vec::new();
         for _ in 0..4 {

@@ -52,7 +52,7 @@ fn input<'a>(case: &'a Case, slot: usize, output: vk::ImageView) -> FrameInput<'
         output,
         debug: false,
         positions: None,
-        neighbours: false,
+        neighbours: 0,
     }
 }
 

@@ -256,6 +256,7 @@ fn what_is_not_finite_is_left_out() {
             }
             let nothing = shot.floats(Id::Diagonals, 0).expect("shapes").chunks(3).filter(|d| d[0] == 0.0).count();
             assert_eq!(nothing, holed.len() - finite.len(), "{}: {search:?}", driver.name);
+            assert_eq!(listed(&shot, holed.len()).0, neighbours(&holed, 8.0 * radius), "{}: {search:?}", driver.name);
             assert!(shot.picture.iter().flatten().all(|v| v.is_finite()), "{}", driver.name);
         }
     });

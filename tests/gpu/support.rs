@@ -109,7 +109,7 @@ impl Driver<'_> {
             output: ash::vk::ImageView::null(),
             debug: true,
             positions,
-            neighbours: positions.is_some(),
+            neighbours: 1022,
         };
         session.frame(&input).expect("frame");
         let mut targets = HashMap::new();

@@ -251,7 +251,7 @@ fn measure(
         output: ash::vk::ImageView::null(),
         debug: false,
         positions: upload.as_ref().map(|u| scene.on_device(u.buffer)),
-        neighbours: false,
+        neighbours: 0,
     };
     let bar = progress(u64::from(args.warmup + args.frames), "frames");
     let mut frames: Vec<FrameTimes> = Vec::new();

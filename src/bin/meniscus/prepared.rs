@@ -66,18 +66,28 @@ fn order(session: &mut Session) -> Result<Vec<u32>, HostError> {
     Ok(if sorted { all[(passes & 1) * particles..][..particles].to_vec() } else { (0..particles as u32).collect() })
 }
 
+/// What the device lists of neighbours, and how many words of it are each particle's.
+fn shares(session: &mut Session) -> Result<(Vec<u32>, usize), HostError> {
+    let words = session.words(Id::Neighbours, 0)?.unwrap_or_default();
+    let particles = session.words(Id::Visible, 0)?.map_or(0, |v| v.len());
+    let share = words.len() / particles.max(1);
+    Ok((words, share.max(1)))
+}
+
+/// The most neighbours that a particle has, whether or not there was room to list them.
+pub fn most_neighbours(session: &mut Session) -> Result<u32, HostError> {
+    let (words, share) = shares(session)?;
+    Ok(words.chunks_exact(share).map(|list| list[1]).max().unwrap_or(0))
+}
+
 /// Neighbours of every position, in the order of the input: where each one's begin (one entry more than there are
 /// positions), and their indices, ascending.
-pub fn neighbours(session: &mut Session) -> Result<(Vec<u64>, Vec<u32>), Box<dyn std::error::Error>> {
-    let words = session.words(Id::Neighbours, 0)?.unwrap_or_default();
-    let room = (s::NEIGHBOUR_ROOM + 2) as usize;
-    let mut lists = vec![Vec::new(); words.len() / room];
-    for list in words.chunks_exact(room) {
+pub fn neighbours(session: &mut Session) -> Result<(Vec<u64>, Vec<u32>), HostError> {
+    let (words, share) = shares(session)?;
+    let mut lists = vec![Vec::new(); words.len() / share];
+    for list in words.chunks_exact(share) {
         let (index, number) = (list[0] as usize, list[1] as usize);
-        let Some(found) = list[2..].get(..number) else {
-            return Err(format!("particle {index} has {number} neighbours, and only {} can be listed", room - 2).into());
-        };
-        lists[index] = found.to_vec();
+        lists[index] = list[2..][..number].to_vec();
         lists[index].sort_unstable();
     }
     let mut offsets = vec![0];

@@ -95,7 +95,7 @@ pub struct Args {
     /// Write every intermediate target as .npy into this folder
     #[arg(long, value_name = "DIR")]
     pub dump: Option<PathBuf>,
-    /// With --dump and --prepare gpu: also write every particle's neighbours (four kibibytes of device memory a particle)
+    /// With --dump and --prepare gpu: also write every particle's neighbours (four bytes of device memory for each)
     #[arg(long, requires = "dump")]
     pub dump_neighbours: bool,
     /// Run with core and synchronization validation; any message is an error
@@ -270,7 +270,7 @@ fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error
         output: ash::vk::ImageView::null(), // the session's canvas
         debug: false,
         positions: upload.as_ref().map(|u| job.scene.on_device(u.buffer)),
-        neighbours: false,
+        neighbours: 0,
     };
     let mut times = session.frame(&input)?;
     if job.args.stats.is_some() {
@@ -284,8 +284,16 @@ fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error
     }
     let memory = session.renderer.memory();
     input.debug = true;
-    input.neighbours = job.args.dump_neighbours;
+    input.neighbours = if job.args.dump_neighbours { 256 } else { 0 };
     session.frame(&input)?;
+    if job.args.dump_neighbours {
+        // Counts are right whatever there is room for.
+        let most = prepared::most_neighbours(session)?;
+        if most > input.neighbours {
+            input.neighbours = most;
+            session.frame(&input)?;
+        }
+    }
     if job.args.prepare.on_device() {
         let prepared = prepared::read(session, job.particles.radius)?;
         (job.particles, job.report, job.index) = (prepared.particles, prepared.report, Some(prepared.index));
