@@ -55,8 +55,7 @@ void main() {
         high = vec3(unordered(extent.at[3]), unordered(extent.at[4]), unordered(extent.at[5]));
     }
     // The table enters particles into the cells around theirs, too.
-    uint entries = prepare.source.w;
-    int more = entries == 1u ? 0 : 1;
+    int more = prepare.source.w == 1u ? 0 : 1;
     uint bits = 0u;
     for (int a = 0; a < 3; ++a) {
         int first = cell_of(low[a], prepare.lengths.x) - more, last = cell_of(high[a], prepare.lengths.x) + more;
@@ -68,10 +67,10 @@ void main() {
     }
     uint passes = (bits + DIGIT_BITS - 1u) / DIGIT_BITS;
     extent.at[EXTENT_PASSES] = passes;
-    uint blocks = (prepare.source.x * entries + BLOCK - 1u) / BLOCK, rows = max((blocks + 65534u) / 65535u, 1u);
+    uint groups = blocks(), rows = max((groups + 65534u) / 65535u, 1u);
     for (uint p = 0u; p < SORT_PASSES; ++p) {
         uint at = EXTENT_DISPATCH + 6u * p, on = p < passes ? 1u : 0u;
-        extent.at[at] = on * ((blocks + rows - 1u) / rows);
+        extent.at[at] = on * ((groups + rows - 1u) / rows);
         extent.at[at + 1u] = rows;
         extent.at[at + 2u] = 1u;
         extent.at[at + 3u] = on * DIGITS;

@@ -20,8 +20,6 @@ layout(set = 0, binding = 8, std430) buffer CounterBlock { uint at[]; } counters
 layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_classes; // 0 splash, 1 body, by input index
 #ifdef NEIGHBOURS
 layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[]; } neighbours;
-// A particle's share: its index, how many neighbours it has, and those of them that there is room for.
-uint share() { return neighbours.at.length() / prepare.source.x; }
 #endif
 layout(constant_id = 0) const bool RELATION = false;
 layout(constant_id = 1) const bool KEEP_CLASSES = false;
@@ -29,10 +27,21 @@ layout(constant_id = 1) const bool KEEP_CLASSES = false;
 uint count() { return prepare.source.x; }
 vec3 sorted_position(uint k) { return vec3(sorted.at[3u * k], sorted.at[3u * k + 1u], sorted.at[3u * k + 2u]); }
 uint order_at(uint place) {
-    uint passes = extent.at[EXTENT_PASSES], entries = count() * prepare.source.w;
-    return passes == 0u ? place : order.at[(passes & 1u) * entries + place];
+    uint passes = extent.at[EXTENT_PASSES];
+    return passes == 0u ? place : order.at[half_before(passes) + place];
 }
 uint input_index(uint k) { return RELATION ? k : order_at(k); }
+
+#ifdef NEIGHBOURS
+// A particle's share: its index, how many neighbours it has, and those of them that there is room for.
+uint share() { return neighbours.at.length() / count(); }
+void list(uint k, uint number) {
+    neighbours.at[k * share()] = input_index(k);
+    neighbours.at[k * share() + 1u] = number;
+}
+#else
+void list(uint k, uint number) {}
+#endif
 
 ivec3 place_cell(uint place) {
     if (!RELATION) return cell_of(sorted_position(place));
@@ -44,7 +53,7 @@ bool before(ivec3 a, ivec3 b) { return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y
 
 // First place whose cell is not before c (`inclusive`: not before or equal to).
 uint search(ivec3 c, bool inclusive, uint low) {
-    uint high = count() * prepare.source.w;
+    uint high = entries();
     while (low < high) {
         uint middle = low + (high - low) / 2u;
         ivec3 m = place_cell(middle);
@@ -71,9 +80,10 @@ uint search_key(uint key, uint low) {
     return low;
 }
 
-// The run of particles in the cells from `from` to `to`, which differ in z alone; it does not begin before `low`.
+// The run of places in the cells from `from` to `to`, which differ in z alone; it does not begin before `low`. Only of
+// particles, and only where keys are one word, are there keys to look in.
 uvec2 run_of(ivec3 from, ivec3 to, uint low) {
-    if (key_bits() > 32u) {
+    if (RELATION || key_bits() > 32u) {
         uint begin = search(from, false, low);
         return uvec2(begin, search(to, true, begin));
     }
@@ -224,10 +234,7 @@ void main() {
         vec3 x = sorted_position(from);
         if (!finite(x)) {
             write(from, vec3(0.0), vec3(0.0), vec3(0.0));
-#ifdef NEIGHBOURS
-            neighbours.at[from * share()] = input_index(from);
-            neighbours.at[from * share() + 1u] = 0u;
-#endif
+            list(from, 0u);
             continue;
         }
         // Those that follow in the same cell or the next: their candidates are nearly the same. Components without a particle
@@ -249,8 +256,7 @@ void main() {
         uvec2 runs[LARGEST_RUNS];
         uint number = 0u;
         if (RELATION) {
-            uint begin = search(cell, false, 0u);
-            runs[number++] = uvec2(begin, search(cell, true, begin));
+            runs[number++] = run_of(cell, cell, 0u);
         } else {
             int around = int(prepare.options.w);
             uint begin = 0u;
@@ -294,10 +300,7 @@ void main() {
         }
         for (uint b = 0u; b < SHAPE_RUN; ++b) {
             if (from + b == next) break;
-#ifdef NEIGHBOURS
-            neighbours.at[(from + b) * share()] = input_index(from + b);
-            neighbours.at[(from + b) * share() + 1u] = s.number[b];
-#endif
+            list(from + b, s.number[b]);
             finish(from + b, of(p, b), s, b);
         }
     }

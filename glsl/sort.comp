@@ -16,11 +16,8 @@ layout(set = 0, binding = 5, std430) buffer SortedBlock { float at[]; } sorted;
 
 const uint ITEMS = BLOCK / PARTICLE_GROUP;
 
-uint entries() { return prepare.source.x * prepare.source.w; }
-uint blocks() { return (entries() + BLOCK - 1u) / BLOCK; }
-
 // The entry at a place before this pass; the first pass finds the input's order.
-uint entry_at(uint place, uint pass) { return pass == 0u ? place : order.at[(pass & 1u) * entries() + place]; }
+uint entry_at(uint place, uint pass) { return pass == 0u ? place : order.at[half_before(pass) + place]; }
 
 uint digit_of(uint entry) {
     uvec3 key = sort_key(entry_cell(entry));
@@ -78,7 +75,7 @@ void main() {
         }
     }
     barrier();
-    uint half_at = ((pass + 1u) & 1u) * entries();
+    uint half_at = half_before(pass + 1u);
     for (uint i = from; i < to; ++i) {
         uint entry = entry_at(i, pass);
         order.at[half_at + counts[digits[i - from] * PARTICLE_GROUP + t]++] = entry;

@@ -237,22 +237,23 @@ impl Renderer {
                 "no environment yet: call Renderer::set_environment first (Equirect::procedural_sky needs no file)",
             ));
         };
-        let mut needs = self.needs(input.settings, input.debug);
         let mut bounds = self.scene.bounds;
         let mut radius = self.scene.radius;
         let mut prepare = None;
         let mut positions = (vk::Buffer::null(), 0, 0);
-        if let Some(p) = &input.positions {
+        let needs = if let Some(p) = &input.positions {
             let begin = p.offset % BINDING_ALIGNMENT;
             let constants = p.constants(begin)?;
-            needs = self.needs_on_device(input.settings, p, input.debug, input.neighbours)?;
             // The device finds the box; what is written here never shows.
             (bounds, radius) = ((Vec3::ZERO, Vec3::ZERO), p.radius);
             if p.count > 0 {
                 positions = (p.buffer, p.offset - begin, begin + p.stride * u64::from(p.count - 1) + 12);
                 prepare = Some(constants);
             }
-        }
+            self.needs_on_device(input.settings, p, input.debug, input.neighbours)?
+        } else {
+            self.needs(input.settings, input.debug)
+        };
         let Some(slot) = self.slots.get_mut(input.slot) else {
             return Err(Error::parameter("slot", input.slot, "use less than Host::frames_in_flight"));
         };

@@ -49,6 +49,13 @@ ivec3 cell_of(vec3 x) {
     return ivec3(cell_of(x.x, prepare.lengths.x), cell_of(x.y, prepare.lengths.x), cell_of(x.z, prepare.lengths.x));
 }
 
+// What the sort orders: particles, or entries of the relation table.
+uint entries() { return prepare.source.x * prepare.source.w; }
+uint blocks() { return (entries() + BLOCK - 1u) / BLOCK; }
+
+// Where in the order's two halves entries lie before a pass of the sort; before the one after the last lies its result.
+uint half_before(uint pass) { return (pass & 1u) * entries(); }
+
 // Which of the 27 cells around a particle's own an entry of the relation table stands for.
 ivec3 entry_offset(uint entry) {
     uint k = entry % 27u;
@@ -83,4 +90,4 @@ uvec3 sort_key(ivec3 whole) {
 uint key_bits() { return extent.at[EXTENT_BITS] + extent.at[EXTENT_BITS + 1] + extent.at[EXTENT_BITS + 2]; }
 
 // Where the half of the order begins that the sort does not leave its result in.
-uint free_half() { return ((extent.at[EXTENT_PASSES] + 1u) & 1u) * prepare.source.x * prepare.source.w; }
+uint free_half() { return half_before(extent.at[EXTENT_PASSES] + 1u); }

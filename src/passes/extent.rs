@@ -1,10 +1,9 @@
 //! The box of all positions, and what follows from it (`glsl/extent.comp`).
 
-use super::{Pipelines, per_block};
+use super::{Pipelines, bind_step, per_block};
 use crate::{
     Error,
     access::Access,
-    pipeline::Pipeline,
     recorder::{Recorder, Use, bound, used},
     shader::{EXTENT_MOST, EXTENT_PLAN_COMP, EXTENT_REDUCE_COMP, Prepare, Shader},
     targets::{Id, Needs},
@@ -38,10 +37,7 @@ impl Extent {
             }
             for (i, (shader, [x, y])) in steps.into_iter().enumerate() {
                 r.barriers("extent", &USES);
-                let make = |_: &usize| Pipeline::compute(host, shader, &[], size_of::<Prepare>() as u32);
-                let pipeline = self.pipelines.get(i, make)?;
-                r.bind(pipeline, &USES)?;
-                r.push(pipeline, prepare);
+                bind_step(&mut self.pipelines, r, (i, shader), &USES, prepare)?;
                 r.dispatch(x, y, 1);
             }
             Ok(())

@@ -18,8 +18,8 @@ use crate::{
     access::Access,
     device::{Host, Limits},
     pipeline::Pipeline,
-    recorder::{Use, bound},
-    shader::{BLOCK, CLASS_BODY, CLASS_SPLASH, PARTICLE_GROUP},
+    recorder::{Recorder, Use, bound},
+    shader::{BLOCK, CLASS_BODY, CLASS_SPLASH, PARTICLE_GROUP, Prepare, Shader},
     targets::{Id, Needs},
 };
 use ash::vk;
@@ -95,6 +95,22 @@ impl<K: std::hash::Hash + Eq + Clone> Pipelines<K> {
     fn destroy(&mut self, host: &Host) {
         self.0.drain().for_each(|(_, mut p)| p.destroy(host));
     }
+}
+
+/// Binds a step of the preparation, with its constants.
+fn bind_step(
+    pipelines: &mut Pipelines<usize>,
+    r: &mut Recorder,
+    (i, shader): (usize, &Shader),
+    uses: &[Use],
+    prepare: &Prepare,
+) -> Result<(), Error> {
+    let host = r.host;
+    let make = |_: &usize| Pipeline::compute(host, shader, &[], size_of::<Prepare>() as u32);
+    let pipeline = pipelines.get(i, make)?;
+    r.bind(pipeline, uses)?;
+    r.push(pipeline, prepare);
+    Ok(())
 }
 
 /// The classes that may have particles.

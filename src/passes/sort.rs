@@ -1,14 +1,12 @@
 //! Particles, or entries of the relation table, sorted by cell (`glsl/sort.comp`; Im16 §III).
 
-use super::{Pipelines, per_particle};
+use super::{Pipelines, bind_step, per_particle};
 use crate::{
     Error,
     access::Access,
-    pipeline::Pipeline,
     recorder::{Recorder, Use, bound, used},
     shader::{
         EXTENT_DISPATCH, Prepare, SORT_COUNT_COMP, SORT_GATHER_COMP, SORT_PASSES, SORT_SCAN_COMP, SORT_SCATTER_COMP,
-        Shader,
     },
     targets::{Id, Needs},
 };
@@ -30,32 +28,23 @@ const USES: [Use; 6] = [
 
 impl Sort {
     pub fn record(&mut self, r: &mut Recorder, needs: &Needs, prepare: &Prepare) -> Result<(), Error> {
+        let mut prepare = *prepare;
         r.pass("sort", &USES, |r| {
             for pass in 0..SORT_PASSES {
+                prepare.options.y = pass;
                 // How many of these passes the occupied cells need only the device knows: the others are empty.
                 let blocks = 4 * u64::from(EXTENT_DISPATCH + 6 * pass);
                 let steps = [(&SORT_COUNT_COMP, blocks), (&SORT_SCAN_COMP, blocks + 12), (&SORT_SCATTER_COMP, blocks)];
                 for (i, (shader, arguments)) in steps.into_iter().enumerate() {
-                    self.step(r, i, shader, prepare, pass)?;
+                    bind_step(&mut self.pipelines, r, (i, shader), &USES, &prepare)?;
                     r.dispatch_indirect(Id::Extent, arguments);
                     r.barriers("sort", &USES);
                 }
             }
-            self.step(r, 3, &SORT_GATHER_COMP, prepare, 0)?;
+            bind_step(&mut self.pipelines, r, (3, &SORT_GATHER_COMP), &USES, &prepare)?;
             let [x, y] = per_particle(needs);
             r.dispatch(x, y, 1);
             Ok(())
         })
-    }
-
-    fn step(&mut self, r: &mut Recorder, i: usize, shader: &Shader, prepare: &Prepare, pass: u32) -> Result<(), Error> {
-        let host = r.host;
-        let make = |_: &usize| Pipeline::compute(host, shader, &[], size_of::<Prepare>() as u32);
-        let pipeline = self.pipelines.get(i, make)?;
-        r.bind(pipeline, &USES)?;
-        let mut prepare = *prepare;
-        prepare.options.y = pass;
-        r.push(pipeline, &prepare);
-        Ok(())
     }
 }

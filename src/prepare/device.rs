@@ -28,6 +28,12 @@ pub struct DevicePositions {
 }
 
 impl DevicePositions {
+    /// Positions that fill a buffer without gaps, prepared with the default options.
+    pub fn packed(buffer: vk::Buffer, count: u32, radius: f32) -> DevicePositions {
+        let options = Options::default();
+        DevicePositions { buffer, offset: 0, stride: 12, count, radius, options, keep_class_below: None }
+    }
+
     /// Entries a particle has in the sort, and the edge of a cell in supports.
     fn layout(&self) -> (u32, f64) {
         match self.options.search {

@@ -5,11 +5,7 @@ use glam::{DMat3, DVec3};
 use super::density::lattice;
 use super::neighbours::Grid;
 use super::options::{Options, Scale};
-use crate::particles::Ellipsoid;
-
-/// Below this share of the filled body's variance the neighbours lie on one spot: their spread
-/// says nothing about a shape.
-const DEGENERATE: f64 = 0.05;
+use crate::{particles::Ellipsoid, shader::DEGENERATE_SHARE};
 
 /// How an ellipsoid came about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +78,7 @@ impl<'a> Fitter<'a> {
         }
         mean /= sum;
         let (variances, frame) = eigen_symmetric(covariance * (1.0 / sum) - outer(mean, mean));
-        if variances.x < DEGENERATE * self.full {
+        if variances.x < f64::from(DEGENERATE_SHARE) * self.full {
             return (sphere, Shape::Degenerate);
         }
 

@@ -85,15 +85,7 @@ fn two_frames_in_flight_from_positions_on_the_device() {
                     for slot in 0..2 {
                         let canvas = &canvases[slot];
                         canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
-                        let positions = DevicePositions {
-                            buffer: uploads[slot].buffer,
-                            offset: 0,
-                            stride: 12,
-                            count: clouds[slot].len() as u32,
-                            radius: 0.1,
-                            options: Default::default(),
-                            keep_class_below: None,
-                        };
+                        let positions = DevicePositions::packed(uploads[slot].buffer, clouds[slot].len() as u32, 0.1);
                         let input = FrameInput { positions: Some(positions), ..input(&case, slot, canvas.view) };
                         // SAFETY: `cmd` is recording outside rendering; the slot's last frame was waited for by `run`.
                         unsafe { renderer.record(cmd, &input) }?;
@@ -281,15 +273,7 @@ fn what_the_caller_gets_wrong_is_said() {
             flat.camera.near = 0.0;
             assert!(refused(&input(&flat, 0, canvas.view)).contains("near plane"));
             // Positions on the device. Nothing is recorded, so their buffer need not be there.
-            let positions = DevicePositions {
-                buffer: vk::Buffer::null(),
-                offset: 0,
-                stride: 12,
-                count: 10,
-                radius: 0.1,
-                options: Default::default(),
-                keep_class_below: None,
-            };
+            let positions = DevicePositions::packed(vk::Buffer::null(), 10, 0.1);
             let far_too_many = u32::try_from(u64::from(u32::MAX) / 2).expect("it fits");
             for (wrong, word) in [
                 (DevicePositions { offset: 6, ..positions }, "offset of positions is 6"),

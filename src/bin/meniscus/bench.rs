@@ -8,7 +8,7 @@ use crate::{
 use glam::{DVec3, Vec3};
 use meniscus::{
     Equirect, FrameInput, Settings,
-    host::{Gpu, Instance, Session, Upload},
+    host::{Gpu, Instance, Session},
     io::images,
     profile::FrameTimes,
     targets::LedgerEntry,
@@ -236,12 +236,7 @@ fn measure(
     let aspect = args.size[0] as f32 / args.size[1] as f32;
     let view = View { eye: None, target: None, up: DVec3::Y, fov_y_deg: 40.0 };
     let (camera, eye) = camera::frame(&view, scene.origin, &scene.particles, aspect, 0.1 * scene.particles.radius)?;
-    let upload = if args.prepare.on_device() {
-        Some(Upload::new(session.gpu, bytemuck::cast_slice(&scene.positions))?)
-    } else {
-        session.renderer.set_particles(&scene.particles)?;
-        None
-    };
+    let upload = scene.give(args.prepare, session)?;
     let input = FrameInput {
         slot: 0,
         camera: &camera,
@@ -250,7 +245,7 @@ fn measure(
         eye_inside: scene.inside(eye),
         output: ash::vk::ImageView::null(),
         debug: false,
-        positions: upload.as_ref().map(|u| scene.on_device(u.buffer)),
+        positions: upload.as_ref().map(|u| scene.on_device(u)),
         neighbours: 0,
     };
     let bar = progress(u64::from(args.warmup + args.frames), "frames");

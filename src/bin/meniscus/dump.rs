@@ -53,7 +53,7 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     out.array("color_linear", 3, session.picture()?.into_iter().flatten())?;
     particles(&folder.join("particles.npz"), job)?;
     if job.args.dump_neighbours {
-        neighbours(&folder.join("neighbours.npz"), session)?;
+        neighbours(&folder.join("neighbours.npz"), job, session)?;
     }
     write_file(&folder.join("frame.json"), serde_json::to_string_pretty(&frame(job))?.as_bytes())?;
     Ok(())
@@ -97,7 +97,7 @@ fn npy<T: npyz::AutoSerialize>(shape: &[u64], data: impl Iterator<Item = T>) -> 
 }
 
 fn particles(path: &Path, job: &Job) -> Result<()> {
-    let (p, origin) = (&job.particles, job.scene.origin);
+    let (p, origin) = (job.particles(), job.scene.origin);
     let n = p.ellipsoids.len() as u64;
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut npz = npyz::npz::NpzWriter::new(&mut bytes);
@@ -113,9 +113,9 @@ fn particles(path: &Path, job: &Job) -> Result<()> {
     let mut w = npz.array("class", Default::default())?.default_dtype().shape(&[n]).begin_nd()?;
     w.extend((0..p.ellipsoids.len()).map(|i| u8::from(i >= p.splash_count)))?;
     w.finish()?;
-    if let Some(index) = &job.index {
+    if let Some(prepared) = &job.prepared {
         let mut w = npz.array("index", Default::default())?.default_dtype().shape(&[n]).begin_nd()?;
-        w.extend(index.iter().copied())?;
+        w.extend(prepared.index.iter().copied())?;
         w.finish()?;
     }
     drop(npz); // writes the archive's directory
@@ -124,8 +124,8 @@ fn particles(path: &Path, job: &Job) -> Result<()> {
 }
 
 /// `offsets` (one more than particles) into `indices`, by index in the file.
-fn neighbours(path: &Path, session: &mut Session) -> Result<()> {
-    let (offsets, indices) = crate::prepared::neighbours(session)?;
+fn neighbours(path: &Path, job: &Job, session: &mut Session) -> Result<()> {
+    let (offsets, indices) = crate::prepared::neighbours(session, job.scene.positions.len())?;
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut npz = npyz::npz::NpzWriter::new(&mut bytes);
     let mut w = npz.array("offsets", Default::default())?.default_dtype().shape(&[offsets.len() as u64]).begin_nd()?;

@@ -26,9 +26,10 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
         Ok::<_, HostError>(words(session, id)?.chunks_exact(3).map(triple).collect::<Vec<_>>())
     };
     let (centers, diagonals, mixed) = (array(Id::Centers)?, array(Id::Diagonals)?, array(Id::Mixed)?);
+    let order = order(session, centers.len())?;
     let sphere = Mat3::from_diagonal(Vec3::splat(radius));
     let (mut splash, mut body) = (Vec::new(), Vec::new());
-    for (((center, d), m), index) in centers.into_iter().zip(diagonals).zip(mixed).zip(order(session)?) {
+    for (((center, d), m), index) in centers.into_iter().zip(diagonals).zip(mixed).zip(order) {
         if d.x < 0.0 {
             splash.push((Ellipsoid { center, axes: sphere }, index));
         } else if d.x > 0.0 {
@@ -56,34 +57,32 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     Ok(Prepared { particles: Particles { radius, ellipsoids, splash_count }, report, index })
 }
 
-/// Which position each particle of the device's arrays was.
-fn order(session: &mut Session) -> Result<Vec<u32>, HostError> {
+/// Which position each of so many particles of the device's arrays was.
+fn order(session: &mut Session, particles: usize) -> Result<Vec<u32>, HostError> {
     let all = session.words(Id::Order, 0)?.unwrap_or_default();
     let passes = session.words(Id::Extent, 0)?.map_or(0, |e| e[s::EXTENT_PASSES as usize] as usize);
-    let particles = session.words(Id::Visible, 0)?.map_or(0, |v| v.len());
     let sorted = all.len() == 2 * particles && passes > 0;
     // The relation table leaves particles in the order of the input.
     Ok(if sorted { all[(passes & 1) * particles..][..particles].to_vec() } else { (0..particles as u32).collect() })
 }
 
-/// What the device lists of neighbours, and how many words of it are each particle's.
-fn shares(session: &mut Session) -> Result<(Vec<u32>, usize), HostError> {
+/// What the device lists of so many particles' neighbours, and how many words of it are each one's.
+fn shares(session: &mut Session, particles: usize) -> Result<(Vec<u32>, usize), HostError> {
     let words = session.words(Id::Neighbours, 0)?.unwrap_or_default();
-    let particles = session.words(Id::Visible, 0)?.map_or(0, |v| v.len());
     let share = words.len() / particles.max(1);
     Ok((words, share.max(1)))
 }
 
 /// The most neighbours that a particle has, whether or not there was room to list them.
-pub fn most_neighbours(session: &mut Session) -> Result<u32, HostError> {
-    let (words, share) = shares(session)?;
+pub fn most_neighbours(session: &mut Session, particles: usize) -> Result<u32, HostError> {
+    let (words, share) = shares(session, particles)?;
     Ok(words.chunks_exact(share).map(|list| list[1]).max().unwrap_or(0))
 }
 
 /// Neighbours of every position, in the order of the input: where each one's begin (one entry more than there are
 /// positions), and their indices, ascending.
-pub fn neighbours(session: &mut Session) -> Result<(Vec<u64>, Vec<u32>), HostError> {
-    let (words, share) = shares(session)?;
+pub fn neighbours(session: &mut Session, particles: usize) -> Result<(Vec<u64>, Vec<u32>), HostError> {
+    let (words, share) = shares(session, particles)?;
     let mut lists = vec![Vec::new(); words.len() / share];
     for list in words.chunks_exact(share) {
         let (index, number) = (list[0] as usize, list[1] as usize);

@@ -2,7 +2,8 @@
 
 use crate::{
     camera::{self, View},
-    dump, prepared,
+    dump,
+    prepared::{self, Prepared},
     scene::{Prepare, Scene, Source, spinner},
     stats,
 };
@@ -10,7 +11,7 @@ use clap::ValueEnum;
 use glam::{DVec3, Vec3};
 use meniscus::{
     Camera, Equirect, Error, FrameInput, Fresnel, Particles, Settings, Weighting,
-    host::{Gpu, Instance, Session, Upload},
+    host::{Gpu, Instance, Session},
     io::images,
     prepare::Report,
 };
@@ -133,17 +134,25 @@ fn parse_vector(s: &str) -> Result<DVec3, String> {
 pub struct Job<'a> {
     pub args: &'a Args,
     pub scene: &'a Scene,
-    /// As drawn.
-    pub particles: Particles,
-    pub report: Report,
-    /// Which of the file's positions each particle was, where the device prepared them.
-    pub index: Option<Vec<u32>>,
+    /// What the device prepared, once it is read back.
+    pub prepared: Option<Prepared>,
     pub camera: Camera,
     pub eye: Vec3,
     pub settings: Settings,
     /// Size rendered at: the picture's times the supersampling.
     pub size: [u32; 2],
     pub eye_inside: bool,
+}
+
+impl Job<'_> {
+    /// As drawn.
+    pub fn particles(&self) -> &Particles {
+        self.prepared.as_ref().map_or(&self.scene.particles, |p| &p.particles)
+    }
+
+    pub fn report(&self) -> &Report {
+        self.prepared.as_ref().map_or(&self.scene.report, |p| &p.report)
+    }
 }
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
@@ -239,27 +248,11 @@ fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::er
     };
     settings.validate()?;
     let size = [times(args.size[0])?, times(args.size[1])?];
-    Ok(Job {
-        args,
-        scene,
-        particles: scene.particles.clone(),
-        report: scene.report,
-        index: None,
-        camera,
-        eye,
-        settings,
-        size,
-        eye_inside: scene.inside(eye),
-    })
+    Ok(Job { args, scene, prepared: None, camera, eye, settings, size, eye_inside: scene.inside(eye) })
 }
 
 fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error::Error>> {
-    let upload = if job.args.prepare.on_device() {
-        Some(Upload::new(session.gpu, bytemuck::cast_slice(&job.scene.positions))?)
-    } else {
-        session.renderer.set_particles(&job.particles)?;
-        None
-    };
+    let upload = job.scene.give(job.args.prepare, session)?;
     let (camera, settings) = (job.camera, job.settings);
     let mut input = FrameInput {
         slot: 0,
@@ -269,7 +262,7 @@ fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error
         eye_inside: job.eye_inside,
         output: ash::vk::ImageView::null(), // the session's canvas
         debug: false,
-        positions: upload.as_ref().map(|u| job.scene.on_device(u.buffer)),
+        positions: upload.as_ref().map(|u| job.scene.on_device(u)),
         neighbours: 0,
     };
     let mut times = session.frame(&input)?;
@@ -288,15 +281,14 @@ fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error
     session.frame(&input)?;
     if job.args.dump_neighbours {
         // Counts are right whatever there is room for.
-        let most = prepared::most_neighbours(session)?;
+        let most = prepared::most_neighbours(session, job.scene.positions.len())?;
         if most > input.neighbours {
             input.neighbours = most;
             session.frame(&input)?;
         }
     }
     if job.args.prepare.on_device() {
-        let prepared = prepared::read(session, job.particles.radius)?;
-        (job.particles, job.report, job.index) = (prepared.particles, prepared.report, Some(prepared.index));
+        job.prepared = Some(prepared::read(session, job.scene.particles.radius)?);
     }
     if let Some(folder) = &job.args.dump {
         dump::write(folder, job, session)?;

@@ -4,6 +4,7 @@ use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
     Class, Ellipsoid, Particles,
+    host::{Session, Upload},
     io::particles::{Invalid, check_finite, read},
     prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
 };
@@ -119,15 +120,7 @@ impl Scene {
             classes: classes.as_deref(),
             ellipsoids: axes.as_deref(),
         };
-        let bar = progress(positions.len() as u64, "classes and ellipsoids");
-        let start = std::time::Instant::now();
-        let (particles, report) = if source.prepare.on_device() {
-            (uniform(&positions, radius as f32), Report::default())
-        } else {
-            prepare::prepare_with_progress(&input, &options, &|done| bar.set_position(done as u64))?
-        };
-        let prepare_ms = start.elapsed().as_secs_f64() * 1e3;
-        bar.finish_and_clear();
+        let (particles, report, prepare_ms) = make(&input, &options, source.prepare)?;
         let density = if report.body > 0 || source.prepare.on_device() {
             Some(DensityField::new(&positions, radius as f32, &options)?)
         } else {
@@ -139,42 +132,54 @@ impl Scene {
     /// Positions that were made, not read.
     pub fn synthetic(positions: Vec<Vec3>, radius: f32, place: Prepare) -> Result<Scene, Box<dyn Error>> {
         let options = Options { search: place.search(), ..Options::default() };
-        let start = std::time::Instant::now();
-        let (particles, report) = if place.on_device() {
-            (uniform(&positions, radius), Report::default())
-        } else {
-            prepare::prepare(&Input { positions: &positions, radius, classes: None, ellipsoids: None }, &options)?
-        };
+        let input = Input { positions: &positions, radius, classes: None, ellipsoids: None };
+        let (particles, report, prepare_ms) = make(&input, &options, place)?;
         Ok(Scene {
             particles,
             report,
             origin: DVec3::ZERO,
             radius_source: "made",
             dropped: 0,
-            prepare_ms: start.elapsed().as_secs_f64() * 1e3,
+            prepare_ms,
             positions,
             options,
             density: None,
         })
     }
 
-    /// Its positions in a buffer of the device's, tightly packed.
-    pub fn on_device(&self, buffer: ash::vk::Buffer) -> DevicePositions {
-        DevicePositions {
-            buffer,
-            offset: 0,
-            stride: 12,
-            count: self.positions.len() as u32,
-            radius: self.particles.radius,
-            options: self.options,
-            keep_class_below: None,
+    /// Gives its particles to the renderer or, where the device prepares them, its positions in a buffer.
+    pub fn give<'a>(&self, place: Prepare, session: &mut Session<'a>) -> Result<Option<Upload<'a>>, Box<dyn Error>> {
+        if place.on_device() {
+            return Ok(Some(Upload::new(session.gpu, bytemuck::cast_slice(&self.positions))?));
         }
+        session.renderer.set_particles(&self.particles)?;
+        Ok(None)
+    }
+
+    /// What [`Scene::give`] uploaded.
+    pub fn on_device(&self, upload: &Upload) -> DevicePositions {
+        let packed = DevicePositions::packed(upload.buffer, self.positions.len() as u32, self.particles.radius);
+        DevicePositions { options: self.options, ..packed }
     }
 
     /// Whether a point (relative to the origin) is inside the body: half as dense as a filled body.
     pub fn inside(&self, point: Vec3) -> bool {
         self.density.as_ref().is_some_and(|d| d.relative_density(point) >= 0.5)
     }
+}
+
+/// Particles as the CPU prepares them, or what is known before the device does; and the milliseconds that it took.
+fn make(input: &Input, options: &Options, place: Prepare) -> Result<(Particles, Report, f64), Box<dyn Error>> {
+    let bar = progress(input.positions.len() as u64, "classes and ellipsoids");
+    let start = std::time::Instant::now();
+    let (particles, report) = if place.on_device() {
+        (uniform(input.positions, input.radius), Report::default())
+    } else {
+        prepare::prepare_with_progress(input, options, &|done| bar.set_position(done as u64))?
+    };
+    let ms = start.elapsed().as_secs_f64() * 1e3;
+    bar.finish_and_clear();
+    Ok((particles, report, ms))
 }
 
 /// Spheres as large as any ellipsoid that the device may make: for the camera, and for the box around the liquid.

@@ -32,7 +32,7 @@ pub fn write(
     let direction = session.words(Id::Direction, 0)?.unwrap_or_default();
     let flipped: f64 = direction.chunks_exact(4).map(|d| f64::from(f32::from_bits(d[3]))).sum();
     guards.insert("walk_normal_faced_the_wrong_way".into(), json!(flipped));
-    let r = &job.report;
+    let r = job.report();
     guards.insert("ellipsoid_few_neighbours".into(), json!(r.few_neighbours));
     guards.insert("ellipsoid_degenerate".into(), json!(r.degenerate));
     guards.insert("ellipsoid_clamped_long".into(), json!(r.clamped_long));
