@@ -60,7 +60,7 @@ void main() {
     // the image, is the same either way.
     if (block == 0u && gl_LocalInvocationIndex < LISTS) {
         uint l = gl_LocalInvocationIndex, n = sums.at[LISTS * blocks() + l];
-        bool quads = frame.particles.w != 0u || counters.at[COUNT_LARGE_SPLASH + l / 2u] != 0u;
+        bool quads = (frame.particles.w | counters.at[COUNT_LARGE_SPLASH + l / 2u]) != 0u;
         draws.at[l] = Draws(uvec4(quads ? 0u : n, 1u, 0u, 0u), uvec4(4u, quads ? n : 0u, 0u, 0u));
         counters.at[COUNT_SPLASH_FRONT + l] = n;
     }

@@ -34,8 +34,7 @@ void main() {
         verdict = 0u;
         uint width = uint(frame.viewport.x), pixels = width * uint(frame.viewport.y);
         Cast c = cast_of(e);
-        float rounding = DEPTH_ROUNDING * frame.viewport.w;
-        uint front = floatBitsToUint(max(near - rounding, 0.0)), back = floatBitsToUint(far + rounding);
+        uint front = floatBitsToUint(max(near - DEPTH_ROUNDING, 0.0)), back = floatBitsToUint(far + DEPTH_ROUNDING);
         for (int y = lo.y; y <= hi.y && verdict != wanted; ++y) {
             for (int x = lo.x; x <= hi.x && verdict != wanted; ++x) {
                 uint pixel = uint(y) * width + uint(x);
@@ -44,8 +43,8 @@ void main() {
                 // Only then the surface itself.
                 float nearer, farther;
                 if (!hits(c, vec2(x, y) + 0.5, 1.0, nearer, farther)) continue;
-                if (may_front && nearer - rounding <= uintBitsToFloat(bounds.at[pixel])) verdict |= VISIBLE_FRONT;
-                if (may_back && farther + rounding >= uintBitsToFloat(bounds.at[pixels + pixel])) verdict |= VISIBLE_BACK;
+                if (may_front && nearer - DEPTH_ROUNDING <= uintBitsToFloat(bounds.at[pixel])) verdict |= VISIBLE_FRONT;
+                if (may_back && farther + DEPTH_ROUNDING >= uintBitsToFloat(bounds.at[pixels + pixel])) verdict |= VISIBLE_BACK;
             }
         }
     }

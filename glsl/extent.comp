@@ -55,7 +55,7 @@ void main() {
         high = vec3(unordered(extent.at[3]), unordered(extent.at[4]), unordered(extent.at[5]));
     }
     // The table enters particles into the cells around theirs, too.
-    int more = prepare.source.w == 1u ? 0 : 1;
+    int more = RELATION ? 1 : 0;
     uint bits = 0u;
     for (int a = 0; a < 3; ++a) {
         int first = cell_of(low[a], prepare.lengths.x) - more, last = cell_of(high[a], prepare.lengths.x) + more;
@@ -77,17 +77,21 @@ void main() {
         extent.at[at + 4u] = 1u;
         extent.at[at + 5u] = 1u;
     }
+    // The liquid's own space: a particle's place is the origin (src/space.rs).
+    vec3 origin = position(prepare.source.x / 2u);
+    if (!finite(origin)) origin = 0.5 * low + 0.5 * high;
+    for (int a = 0; a < 3; ++a) extent.at[EXTENT_ORIGIN + a] = floatBitsToUint(origin[a]);
+    float unit = 1.0 / prepare.lengths.y, room = max(prepare.shape.z, 1.0);
+    frame.view[3].xyz = unit * (mat3(frame.view) * origin + frame.view[3].xyz);
     // What Camera::uniforms makes of the same box, with room for ellipsoids around the outermost centres.
-    float radius = prepare.lengths.y;
-    vec3 room = vec3(max(prepare.shape.z, 1.0) * radius);
-    low -= room;
-    high += room;
+    low = unit * (low - origin) - room;
+    high = unit * (high - origin) + room;
     float middle = length((frame.view * vec4(0.5 * (low + high), 1.0)).xyz);
     float pixel = middle / max(abs(frame.to_pixel.x), abs(frame.to_pixel.y));
-    float converged = max(1e-3 * radius, 1e-6 * (middle + 0.5 * length(high - low)));
+    float converged = max(1e-3, 1e-6 * (middle + 0.5 * length(high - low)));
     frame.search.x = converged;
-    frame.search.y = max(max(ACCEPTED * radius, ACCEPTED_PIXELS * pixel), converged);
-    frame.search.z = max(JUMP * radius, STEEP * pixel);
+    frame.search.y = max(max(ACCEPTED, ACCEPTED_PIXELS * pixel), converged);
+    frame.search.z = max(JUMP, STEEP * pixel);
     frame.bounds_min = vec4(low, 0.0);
     frame.bounds_max = vec4(high, 0.0);
 }

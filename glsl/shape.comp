@@ -21,7 +21,6 @@ layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_class
 #ifdef NEIGHBOURS
 layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[]; } neighbours;
 #endif
-layout(constant_id = 0) const bool RELATION = false;
 layout(constant_id = 1) const bool KEEP_CLASSES = false;
 
 uint count() { return prepare.source.x; }
@@ -184,36 +183,37 @@ void note(uint what) { ++tally[what - COUNT_SPLASH]; }
 
 // Class and ellipsoid of particle k at x from its sums, those of component b.
 void finish(uint k, vec3 x, Sums s, uint b) {
-    float radius = prepare.lengths.y;
+    vec3 origin = uintBitsToFloat(uvec3(extent.at[EXTENT_ORIGIN], extent.at[EXTENT_ORIGIN + 1], extent.at[EXTENT_ORIGIN + 2]));
+    float unit = 1.0 / prepare.lengths.y;
+    vec3 center = unit * (x - origin);
     float relative = s.density[b] / prepare.classes.z;
     bool body = relative >= prepare.classes.x;
     if (KEEP_CLASSES) {
         uint i = input_index(k);
-        if (prepare.options.z != 0u && body && relative < prepare.classes.y) body = last_classes.at[i] == 1u;
+        uint last = max(last_classes.at[i], 1u - prepare.options.z); // without last classes as if all had been body
+        body = body && (relative >= prepare.classes.y || last != 0u);
         last_classes.at[i] = body ? 1u : 0u;
     }
     if (!body) {
         note(COUNT_SPLASH);
-        write(k, x, vec3(-1.0, 1.0, 1.0), vec3(0.0));
+        write(k, center, vec3(-1.0, 1.0, 1.0), vec3(0.0));
         return;
     }
     note(COUNT_BODY);
     if (s.number[b] <= prepare.options.x + 1u) {
         note(COUNT_FEW_NEIGHBOURS);
-        write(k, x, vec3(1.0), vec3(0.0));
+        write(k, center, vec3(1.0), vec3(0.0));
         return;
     }
     vec3 mean = of(s.first, b) / s.weight[b], d = of(s.diagonal, b) / s.weight[b] - mean * mean;
     vec3 m = of(s.mixed_part, b) / s.weight[b] - mean.xxy * mean.yzz;
-    // In radii, so that squares of lengths neither vanish nor overflow.
-    float unit = 1.0 / (radius * radius);
-    mat3 a = unit * mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z), v;
+    mat3 a = unit * unit * mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z), v;
     eigen(a, v);
     vec3 variance = vec3(a[0][0], a[1][1], a[2][2]);
     float most = max(variance.x, max(variance.y, variance.z)), least = most * prepare.shape.y;
     if (most < DEGENERATE_SHARE * prepare.shape.w) {
         note(COUNT_DEGENERATE);
-        write(k, x, vec3(1.0), vec3(0.0));
+        write(k, center, vec3(1.0), vec3(0.0));
         return;
     }
     if (min(variance.x, min(variance.y, variance.z)) < least) note(COUNT_CLAMPED_RATIO);
@@ -222,7 +222,7 @@ void finish(uint k, vec3 x, Sums s, uint b) {
     vec3 axes = min(wanted, vec3(prepare.shape.z)), l = axes * axes;
     // S = V diag(l) V^T
     vec3 r0 = vec3(v[0].x, v[1].x, v[2].x), r1 = vec3(v[0].y, v[1].y, v[2].y), r2 = vec3(v[0].z, v[1].z, v[2].z);
-    write(k, x + prepare.shape.x * mean, vec3(dot(r0 * r0, l), dot(r1 * r1, l), dot(r2 * r2, l)),
+    write(k, center + prepare.shape.x * unit * mean, vec3(dot(r0 * r0, l), dot(r1 * r1, l), dot(r2 * r2, l)),
           vec3(dot(r0 * r1, l), dot(r0 * r2, l), dot(r1 * r2, l)));
 }
 

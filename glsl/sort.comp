@@ -38,13 +38,13 @@ void main() {
     uint k = invocation();
     if (k >= prepare.source.x) return;
     // The relation table is looked up from particles in the order of the input.
-    uint i = prepare.source.w == 1u ? entry_at(k, extent.at[EXTENT_PASSES]) : k;
+    uint i = RELATION ? k : entry_at(k, extent.at[EXTENT_PASSES]);
     vec3 x = position(i);
     sorted.at[3u * k] = x.x;
     sorted.at[3u * k + 1u] = x.y;
     sorted.at[3u * k + 2u] = x.z;
     // Where keys are one word they are kept, in the half of the order that is free now: look-ups are faster for it.
-    if (prepare.source.w == 1u && key_bits() <= 32u) order.at[free_half() + k] = sort_key(cell_of(x)).x;
+    if (!RELATION && key_bits() <= 32u) order.at[free_half() + k] = sort_key(cell_of(x)).x;
 #else
     uint block = group_index(), t = gl_LocalInvocationIndex, pass = prepare.options.y;
     if (block >= blocks()) return;

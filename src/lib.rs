@@ -22,7 +22,7 @@
 //!
 //! # Spaces and units
 //!
-//! World units are the scene's own. Eye space is right-handed and looks down -z; *linear depth* is `d = -z_eye > 0`.
+//! World units are the scene's own; shaders work in the liquid's own [`space`], so that any scale gives the same picture. Eye space is right-handed and looks down -z; *linear depth* is `d = -z_eye > 0`.
 //! Colours are linear; a UNORM output is encoded as sRGB in the last shader, a float output is not.
 #![warn(missing_docs)]
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -48,6 +48,7 @@ mod resources;
 pub mod settings;
 pub mod shader;
 mod slot;
+pub mod space;
 pub mod targets;
 pub mod twin;
 

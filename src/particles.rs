@@ -1,6 +1,6 @@
 //! Particles as they are drawn.
 
-use glam::{Mat3, Vec3};
+use glam::{DVec3, Mat3, Vec3};
 
 /// Which of the two kinds of liquid a particle belongs to (Imai16 §4.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,8 +45,8 @@ impl Particles {
             .iter()
             .map(|e| {
                 // The support of A u over |u| = 1 along each axis is the length of A's row.
-                let t = e.axes.transpose();
-                let reach = Vec3::new(t.x_axis.length(), t.y_axis.length(), t.z_axis.length());
+                let t = e.axes.as_dmat3().transpose();
+                let reach = DVec3::new(t.x_axis.length(), t.y_axis.length(), t.z_axis.length()).as_vec3();
                 (e.center - reach, e.center + reach)
             })
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))

@@ -13,12 +13,12 @@ use crate::{
     resources::{Buffer, Image, Resource, Retired},
     settings::{Camera, Settings},
     slot::Slot,
+    space::{self, Space},
     targets::{self, Id, LedgerEntry, Needs, Preparation, Spec},
 };
 use ash::vk;
 use glam::{Vec3, Vec4};
 use uploads::PARTICLE_ARRAYS;
-pub use uploads::pack;
 
 /// The host's opaque scene, rendered before the liquid at the same size and with the same camera.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +86,7 @@ pub struct Renderer {
 /// What the renderer remembers of the particles it was given.
 #[derive(Clone, Copy)]
 struct SceneBounds {
-    radius: f32,
+    space: Space,
     splash: usize,
     body: usize,
     bounds: (Vec3, Vec3),
@@ -120,7 +120,7 @@ impl Renderer {
             retired: Retired::default(),
             frame: 0,
             particles: None,
-            scene: SceneBounds { radius: 1.0, splash: 0, body: 0, bounds: (Vec3::ZERO, Vec3::ZERO) },
+            scene: SceneBounds { space: Space::new(1.0, Vec3::ZERO), splash: 0, body: 0, bounds: (Vec3::ZERO, Vec3::ZERO) },
             environment: None,
             plan: Vec::new(),
             last_classes: None,
@@ -238,14 +238,14 @@ impl Renderer {
             ));
         };
         let mut bounds = self.scene.bounds;
-        let mut radius = self.scene.radius;
+        let mut space = self.scene.space;
         let mut prepare = None;
         let mut positions = (vk::Buffer::null(), 0, 0);
         let needs = if let Some(p) = &input.positions {
             let begin = p.offset % BINDING_ALIGNMENT;
             let constants = p.constants(begin)?;
             // The device finds the box; what is written here never shows.
-            (bounds, radius) = ((Vec3::ZERO, Vec3::ZERO), p.radius);
+            (bounds, space) = ((Vec3::ZERO, Vec3::ZERO), Space::new(p.radius, Vec3::ZERO));
             if p.count > 0 {
                 positions = (p.buffer, p.offset - begin, begin + p.stride * u64::from(p.count - 1) + 12);
                 prepare = Some(constants);
@@ -272,7 +272,12 @@ impl Renderer {
         }
         self.last_classes = classes;
 
-        let mut block = input.camera.uniforms(input.settings, self.size, radius, bounds);
+        let mut block = input.camera.uniforms(input.settings, self.size, &space, bounds);
+        if let Some(p) = &input.positions {
+            // In the preparation's units; the extent pass moves the origin and goes on to radii.
+            let shift = input.camera.view.w_axis.truncate() * space::power_of_two(p.radius);
+            block.view.w_axis = shift.extend(1.0);
+        }
         block.particles.x = needs.count;
         block.particles.z = self.limits.point_size as u32;
         block.particles.w = u32::from(input.settings.quads_only || self.limits.point_size <= 1.0);
@@ -291,7 +296,7 @@ impl Renderer {
         };
         if let Some(scene) = &input.scene {
             let p = &input.camera.projection;
-            block.scene = Vec4::new(p.z_axis.z, p.w_axis.z, scene.cleared_depth, block.scene.w);
+            block.scene = Vec4::new(p.z_axis.z, p.w_axis.z / space.radius as f32, scene.cleared_depth, block.scene.w);
             externals.scene_color = (scene.color, scene.color_layout);
             externals.scene_depth = (scene.depth, scene.depth_layout);
         }

@@ -1,6 +1,6 @@
 //! What a frame is asked for: camera, smoothing and optics.
 
-use crate::{Error, shader::Frame};
+use crate::{Error, shader::Frame, space::Space};
 use glam::{Mat3, Mat4, UVec4, Vec3, Vec4};
 
 /// Reflectance of the water surface.
@@ -155,9 +155,12 @@ impl Camera {
         Ok(())
     }
 
-    /// The uniform block of a frame, as shaders and twins read it. `size` in pixels, `radius` and `bounds` (the box
-    /// around the liquid) in world units. Host scene and particle counts are left zero.
-    pub fn uniforms(&self, settings: &Settings, size: [u32; 2], radius: f32, bounds: (Vec3, Vec3)) -> Frame {
+    /// The uniform block of a frame, as shaders and twins read it: lengths in particle radii, positions in the liquid's
+    /// own [`Space`]. `size` in pixels, `bounds` (the box around the liquid) in world units. Host scene and particle counts
+    /// are left zero.
+    pub fn uniforms(&self, settings: &Settings, size: [u32; 2], space: &Space, bounds: (Vec3, Vec3)) -> Frame {
+        let radius = space.radius as f32;
+        let (view, low, high) = (space.view(self.view), space.local(bounds.0), space.local(bounds.1));
         let (w, h) = (size[0] as f32, size[1] as f32);
         let p = &self.projection;
         // pixel = (ndc + 1) / 2 * size and ndc = P v - P02 for v = (x/d, y/d, -1)
@@ -167,30 +170,29 @@ impl Camera {
             (1.0 - p.z_axis.x) * 0.5 * w,
             (1.0 - p.z_axis.y) * 0.5 * h,
         );
-        let (low, high) = bounds;
-        let farthest = self.view.transform_point3(0.5 * (low + high)).length() + 0.5 * (high - low).length();
+        let middle = view.transform_point3(0.5 * (low + high)).length();
+        let farthest = middle + 0.5 * (high - low).length();
         // A thousandth of a radius finds a root; a float's steps at the farthest depth are the floor below it.
-        let converged = (1e-3 * radius).max(1e-6 * farthest);
+        let converged = 1e-3f32.max(1e-6 * farthest);
         // What a pixel covers at the liquid: where particles are hardly larger, their own size says nothing of what a
         // map can tell apart.
-        let middle = self.view.transform_point3(0.5 * (low + high)).length();
         let pixel = middle / to_pixel.x.abs().max(to_pixel.y.abs());
-        let accepted = (Self::ACCEPTED * radius).max(Self::ACCEPTED_PIXELS * pixel).max(converged);
-        let jump = (Self::JUMP * radius).max(Self::JUMP_PIXELS * pixel);
+        let accepted = Self::ACCEPTED.max(Self::ACCEPTED_PIXELS * pixel).max(converged);
+        let jump = Self::JUMP.max(Self::JUMP_PIXELS * pixel);
         let to_up = Mat3::from_quat(glam::Quat::from_rotation_arc(self.up.normalize(), Vec3::Y));
         Frame {
-            view: self.view,
+            view,
             eye_to_env: Mat4::from_mat3(to_up * Mat3::from_mat4(self.view).transpose()),
             to_pixel,
-            viewport: Vec4::new(w, h, self.near, radius),
+            viewport: Vec4::new(w, h, self.near / radius, 0.0),
             smoothing: Vec4::new(
-                settings.sigma * radius,
-                crate::shader::FIT_UPDATE_LIMIT * settings.sigma * radius,
+                settings.sigma,
+                crate::shader::FIT_UPDATE_LIMIT * settings.sigma,
                 crate::shader::FIT_GRAZING_LIMIT,
                 0.0,
             ),
             search: Vec4::new(converged, accepted, jump, settings.ior),
-            absorption: settings.absorption.extend(0.0),
+            absorption: (settings.absorption * radius).extend(0.0),
             bounds_min: low.extend(0.0),
             bounds_max: high.extend(0.0),
             scene: Vec4::ZERO,

@@ -2,12 +2,14 @@
 layout(set = 0, binding = 1, std430) readonly buffer PositionBlock { float at[]; } positions;
 layout(set = 0, binding = 2, std430) buffer ExtentBlock { uint at[]; } extent;
 layout(push_constant) uniform PushBlock { Prepare prepare; };
+// A constant and not a branch on prepare.source.w: see refract.frag on branches that only uniforms decide.
+layout(constant_id = 0) const bool RELATION = false; // the sort orders entries of the relation table, not particles
 
 const int FURTHEST_CELL = 1 << 29;
 
 vec3 position(uint i) {
     uint at = prepare.source.y + i * prepare.source.z;
-    return vec3(positions.at[at], positions.at[at + 1u], positions.at[at + 2u]);
+    return prepare.classes.w * vec3(positions.at[at], positions.at[at + 1u], positions.at[at + 2u]);
 }
 
 bool finite(vec3 x) { return !any(isnan(x)) && !any(isinf(x)); }
@@ -50,7 +52,7 @@ ivec3 cell_of(vec3 x) {
 }
 
 // What the sort orders: particles, or entries of the relation table.
-uint entries() { return prepare.source.x * prepare.source.w; }
+uint entries() { return prepare.source.x * (RELATION ? 27u : 1u); }
 uint blocks() { return (entries() + BLOCK - 1u) / BLOCK; }
 
 // Where in the order's two halves entries lie before a pass of the sort; before the one after the last lies its result.
@@ -64,7 +66,8 @@ ivec3 entry_offset(uint entry) {
 
 // The cell of sort entry e: a particle, or (relation table) a particle in one of 27 cells.
 ivec3 entry_cell(uint e) {
-    return prepare.source.w == 1u ? cell_of(position(e)) : cell_of(position(e / 27u)) + entry_offset(e);
+    if (RELATION) return cell_of(position(e / 27u)) + entry_offset(e);
+    return cell_of(position(e));
 }
 
 // Adds an axis's bits to a key of three words.

@@ -11,11 +11,10 @@ Ellipsoid to_eye(Particle p) {
     vec3 d = p.shape_diagonal.xyz, m = p.shape_mixed.xyz;
     mat3 S = mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z);
     mat3 E = R * S * transpose(R);
-    float r2 = frame.viewport.w * frame.viewport.w;
     Ellipsoid e;
     e.center = (frame.view * vec4(p.center.xyz, 1.0)).xyz;
-    e.sd = r2 * vec3(E[0][0], E[1][1], E[2][2]);
-    e.sm = r2 * vec3(E[1][0], E[2][0], E[2][1]);
+    e.sd = vec3(E[0][0], E[1][1], E[2][2]);
+    e.sm = vec3(E[1][0], E[2][0], E[2][1]);
     return e;
 }
 

@@ -71,8 +71,8 @@
 #define COUNTERS 17
 
 // Words of the extent buffer: smallest and largest coordinates (as integers in the order of the floats), the occupied
-// cells (first, last), bits of each axis that a sort key needs, passes of the sort, and for each pass that there could
-// be the indirect dispatches of its blocks and of its rows.
+// cells (first, last), bits of each axis that a sort key needs, passes of the sort, for each pass that there could
+// be the indirect dispatches of its blocks and of its rows, and the origin of the liquid's own space.
 #define EXTENT_LEAST 0
 #define EXTENT_MOST 3
 #define EXTENT_FIRST_CELL 6
@@ -80,7 +80,8 @@
 #define EXTENT_BITS 12
 #define EXTENT_PASSES 15
 #define EXTENT_DISPATCH 16
-#define EXTENT_WORDS 140
+#define EXTENT_ORIGIN 136
+#define EXTENT_WORDS 139
 
 // A sort pass orders by so many bits; keys of three 31-bit cell coordinates need so many passes at most.
 #define DIGIT_BITS 5
@@ -123,26 +124,26 @@
 #define ACCEPTED_PIXELS 0.1
 #define JUMP 2.0
 
-// One particle, as drawn: eye-independent. In memory it is three arrays of three floats, with the class as a sign (see
-// particles.glsl).
+// One particle, as drawn: eye-independent, in the liquid's own space (src/space.rs: lengths in particle radii). In memory it is three arrays of three floats, with the class as a sign (see particles.glsl).
 struct Particle {
-    vec4 center;         // xyz: world position
-    vec4 shape_diagonal; // xx, yy, zz of S = A A^T / r^2, A's columns the semi-axes
+    vec4 center;         // xyz: position
+    vec4 shape_diagonal; // xx, yy, zz of S = A A^T, A's columns the semi-axes
     vec4 shape_mixed;    // xy, xz, yz of S
 };
 
-// One frame's parameters. Eye space looks down -z; d = -z is the linear depth; a view ray is v = (vx, vy, -1).
+// One frame's parameters. All lengths are in particle radii. Eye space looks down -z; d = -z is the linear depth; a view
+// ray is v = (vx, vy, -1).
 struct Frame {
-    mat4 view;         // world to eye, rigid
+    mat4 view;         // the liquid's space to eye space: a rotation or reflection, and a shift
     mat4 eye_to_env;   // rotation from eye space to the environment map's space (+y up)
     vec4 to_pixel;     // ax, ay, bx, by: pixel = a * v.xy + b
-    vec4 viewport;     // width, height in pixels; near plane; particle radius r
+    vec4 viewport;     // width, height in pixels; near plane; unused
     vec4 smoothing;    // sigma; largest update; grazing limit; unused
     vec4 search;       // converged |f|; accepted |f|; largest depth spread that is interpolated; index of refraction
-    vec4 absorption;   // rgb coefficient per world unit; w unused
-    vec4 bounds_min;   // world box around everything drawn
+    vec4 absorption;   // rgb coefficient; w unused
+    vec4 bounds_min;   // box around everything drawn
     vec4 bounds_max;
-    vec4 scene;        // host scene: P22, P23, cleared depth value; w: 1 if the eye is inside the body
+    vec4 scene;        // host scene: P22, P23 over the radius, cleared depth value; w: 1 if the eye is inside the body
     uvec4 particles;   // count; unused; largest point size in pixels; 1 to draw quads only
 };
 
@@ -152,11 +153,12 @@ struct Draws {
     uvec4 quads;
 };
 
-// Push constants of the preparation.
+// Push constants of the preparation. Lengths are world units times a power of two that brings the radius into 1..2: that
+// rounds nothing, and squares of lengths stay within float32 at any scale.
 struct Prepare {
     uvec4 source;   // particles; where positions begin and how far apart they are, in words; entries a particle has in the sort
     vec4 lengths;   // edge of a cell; particle radius r; support h; reach of the neighbours that shape ellipsoids, 2 h
-    vec4 classes;   // splash below this share of the filled body's density; last class kept below this one; sum of a filled body's weights; unused
+    vec4 classes;   // splash below this share of the filled body's density; last class kept below this one; sum of a filled body's weights; the power of two
     vec4 shape;     // lambda; 1 / largest ratio of semi-axes; longest semi-axis and variance of a filled body in r and its square
     uvec4 options;  // fewest neighbours; pass of the sort; 1 if last classes are there; cells to either side that hold neighbours
 };

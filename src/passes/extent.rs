@@ -12,8 +12,8 @@ use ash::vk;
 
 #[derive(Default)]
 pub(crate) struct Extent {
-    /// By step.
-    pub pipelines: Pipelines<usize>,
+    /// By step, and whether the relation table is sorted.
+    pub pipelines: Pipelines<(usize, bool)>,
 }
 
 const USES: [Use; 4] = [

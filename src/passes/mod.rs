@@ -99,15 +99,17 @@ impl<K: std::hash::Hash + Eq + Clone> Pipelines<K> {
 
 /// Binds a step of the preparation, with its constants.
 fn bind_step(
-    pipelines: &mut Pipelines<usize>,
+    pipelines: &mut Pipelines<(usize, bool)>,
     r: &mut Recorder,
     (i, shader): (usize, &Shader),
     uses: &[Use],
     prepare: &Prepare,
 ) -> Result<(), Error> {
     let host = r.host;
-    let make = |_: &usize| Pipeline::compute(host, shader, &[], size_of::<Prepare>() as u32);
-    let pipeline = pipelines.get(i, make)?;
+    let make = |(_, relation): &(usize, bool)| {
+        Pipeline::compute(host, shader, &[u32::from(*relation)], size_of::<Prepare>() as u32)
+    };
+    let pipeline = pipelines.get((i, prepare.source.w != 1), make)?;
     r.bind(pipeline, uses)?;
     r.push(pipeline, prepare);
     Ok(())

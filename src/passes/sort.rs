@@ -13,8 +13,8 @@ use crate::{
 
 #[derive(Default)]
 pub(crate) struct Sort {
-    /// By step.
-    pub pipelines: Pipelines<usize>,
+    /// By step, and whether the relation table is sorted.
+    pub pipelines: Pipelines<(usize, bool)>,
 }
 
 const USES: [Use; 6] = [

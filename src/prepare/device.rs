@@ -1,7 +1,7 @@
 //! Preparation on the device: positions in a buffer of the host's, and the constants that its passes take.
 
 use super::{Options, PrepareError, Search, density::rest_density, ellipsoids::lattice_variance, options::Scale};
-use crate::{Error, shader::Prepare};
+use crate::{Error, shader::Prepare, space};
 use ash::vk;
 use glam::{UVec4, Vec4};
 
@@ -62,14 +62,19 @@ impl DevicePositions {
             return Err(Error::parameter("upper splash threshold", f32::NAN, "use a number"));
         }
         let (entries, supports) = self.layout();
-        let cell = (scale.support * supports) as f32;
+        let power = space::power_of_two(self.radius);
         let o = &self.options;
         let relative = scale.support / scale.radius;
         let upper = self.keep_class_below.unwrap_or(o.splash_threshold);
         Ok(Prepare {
             source: UVec4::new(self.count, (begin / 4) as u32, (self.stride / 4) as u32, entries),
-            lengths: Vec4::new(cell, self.radius, scale.support as f32, scale.reach() as f32),
-            classes: Vec4::new(o.splash_threshold, upper, rest_density(relative) as f32, 0.0),
+            lengths: Vec4::new(
+                (scale.support * supports) as f32 * power,
+                self.radius * power,
+                scale.support as f32 * power,
+                scale.reach() as f32 * power,
+            ),
+            classes: Vec4::new(o.splash_threshold, upper, rest_density(relative) as f32, power),
             shape: Vec4::new(
                 o.smoothing,
                 o.max_ratio.recip(),

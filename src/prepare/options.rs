@@ -48,7 +48,8 @@ pub(super) struct Scale {
 impl Scale {
     /// Checks the radius and every option.
     pub fn new(radius: f32, options: &Options) -> Result<Self, PrepareError> {
-        if !(radius.is_finite() && radius > 0.0) {
+        // Its reciprocal has to be a float32 too.
+        if !(f32::MIN_POSITIVE..=f32::MIN_POSITIVE.recip()).contains(&radius) {
             return Err(PrepareError::Radius(radius));
         }
         let support = options.support.unwrap_or(4.0 * radius);

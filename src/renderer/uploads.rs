@@ -6,11 +6,11 @@ use crate::{
     environment::Equirect,
     particles::Particles,
     resources::{Buffer, Image, ImageSpec, Resource},
-    shader,
+    space::Space,
     targets::Id,
 };
 use ash::vk;
-use glam::{Mat3, Vec3, Vec4};
+use glam::Vec3;
 use gpu_allocator::MemoryLocation;
 
 impl Renderer {
@@ -45,10 +45,10 @@ impl Renderer {
             }
         }
         let Ok(mut arrays) = <[Buffer; 3]>::try_from(made) else { unreachable!("one for each array") };
-        let inverse = 1.0 / particles.radius;
+        let space = Space::of(particles);
         let mut bad = None;
         for (i, e) in particles.ellipsoids.iter().enumerate() {
-            let p = pack(e.center, e.axes * inverse);
+            let p = space.pack(e);
             // A splash's first number is negative (glsl/include/particles.glsl).
             let sign = Vec3::new(if i < particles.splash_count { -1.0 } else { 1.0 }, 1.0, 1.0);
             let parts = [p.center.truncate(), p.shape_diagonal.truncate() * sign, p.shape_mixed.truncate()];
@@ -62,7 +62,7 @@ impl Renderer {
         }
         if let Some(i) = bad {
             arrays.iter_mut().for_each(|b| b.destroy(&self.host));
-            let remedy = "centres and semi-axes over the radius have to be finite, squared too";
+            let remedy = "centres and semi-axes have to be finite, in particle radii and squared too";
             return Err(Error::parameter("particles", format!("number {i} is out of range"), remedy));
         }
         for old in self.particles.replace(arrays).into_iter().flatten() {
@@ -70,7 +70,7 @@ impl Renderer {
         }
         let bounds = particles.bounds().unwrap_or_default();
         self.scene = SceneBounds {
-            radius: particles.radius,
+            space,
             splash: particles.splash_count,
             body: particles.body_count(),
             bounds,
@@ -144,13 +144,3 @@ pub(super) const PARTICLE_ARRAYS: [Id; 3] = [Id::Centers, Id::Diagonals, Id::Mix
 const ARRAY_BYTES: u64 = 12;
 /// Where indices of three floats each, or of a rectangle of work groups, would no longer fit 32 bits.
 const MOST_PARTICLES: u64 = 1 << 30;
-
-/// A particle as shaders read it; `axes` in particle radii.
-pub fn pack(center: Vec3, axes: Mat3) -> shader::Particle {
-    let s = axes * axes.transpose();
-    shader::Particle {
-        center: center.extend(0.0),
-        shape_diagonal: Vec4::new(s.x_axis.x, s.y_axis.y, s.z_axis.z, 0.0),
-        shape_mixed: Vec4::new(s.y_axis.x, s.z_axis.x, s.z_axis.y, 0.0),
-    }
-}

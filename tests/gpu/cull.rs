@@ -106,7 +106,7 @@ fn check(driver: &Driver, case: &Case, what: &str) -> Shot {
         // Any pixel's surface, if float32 can tell it from its rivals', belongs to a particle that is drawn.
         for side in [SIDE_FRONT, SIDE_BACK].into_iter().take(sides as usize) {
             for surface in splat(&shot.frame, &particles, &vec![3; particles.len()], side) {
-                let sure = surface.margin > 1e-4 * f64::from(case.particles.radius) && surface.silhouette > 2e-3;
+                let sure = surface.margin > 1e-4 && surface.silhouette > 2e-3;
                 if surface.depth != 0.0 && sure {
                     assert!(got[surface.particle] & (1 << side) != 0, "{label}: {surface:?} is hidden");
                 }

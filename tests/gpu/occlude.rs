@@ -30,7 +30,7 @@ fn check(driver: &Driver, case: &Case, what: &str, bounded_at_least: f64) -> Sho
     let (front, back) = bounds(&shot);
     let body = packed(&case.particles, CLASS_BODY);
     let [want, large, small] = [1.0, 0.0, 3.0].map(|share| occlude(&shot.frame, &body, share * f64::from(SILHOUETTE)));
-    let rounding = ROUNDING * f64::from(case.particles.radius);
+    let rounding = ROUNDING;
     let (mut bounded, mut edges) = (0, 0);
     for i in 0..front.len() {
         let label = format!("{}: {what}: pixel {i}", driver.name);

@@ -59,7 +59,6 @@ fn is_close(shot: &Shot, own: f32, plane: &Plane) -> bool {
 /// Compares one iteration on both layers, from image `from` of one shot to image `to` of another (or the same one).
 fn compare(label: &str, settings: &Settings, from: (&Shot, Id), to: (&Shot, Id)) -> Seen {
     let shot = to.0;
-    let radius = f64::from(shot.frame.viewport.w);
     let mut seen = Seen::default();
     for layer in 0..2 {
         let input = from.0.floats(from.1, layer).expect("input");
@@ -95,7 +94,7 @@ fn compare(label: &str, settings: &Settings, from: (&Shot, Id), to: (&Shot, Id))
             assert!(error <= tolerance, "{}: {} for {plane:?}, from {}", at(), output[i], input[i]);
             seen.fitted += 1;
             seen.worst = seen.worst.max(error / tolerance);
-            seen.sum += error / radius;
+            seen.sum += error;
         }
     }
     seen

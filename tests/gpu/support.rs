@@ -6,6 +6,7 @@ use meniscus::{
     host::{Gpu, Instance, Session, Upload},
     prepare::{self, DevicePositions},
     shader::Frame,
+    space::Space,
     targets::Id,
 };
 use std::{cell::RefCell, collections::HashMap};
@@ -39,6 +40,8 @@ impl<'a> Cloud<'a> {
 /// What a frame left behind.
 pub struct Shot {
     pub frame: Frame,
+    /// In which its targets and its twins measure: particle radii.
+    pub space: Space,
     pub size: [u32; 2],
     pub picture: Vec<[f32; 3]>,
     targets: HashMap<(Id, u32), Vec<u32>>,
@@ -53,6 +56,12 @@ impl Shot {
     /// The same as floats.
     pub fn floats(&self, id: Id, layer: u32) -> Option<Vec<f32>> {
         self.words(id, layer).map(|w| w.iter().map(|w| f32::from_bits(*w)).collect())
+    }
+
+    /// A target of depths, in world units.
+    pub fn depths(&self, id: Id, layer: u32) -> Option<Vec<f32>> {
+        let world = |d: &u32| f32::from_bits(*d) * self.space.radius as f32;
+        self.words(id, layer).map(|w| w.iter().map(world).collect())
     }
 
     pub fn counter(&self, slot: u32) -> u32 {
@@ -122,9 +131,13 @@ impl Driver<'_> {
         }
         let picture = session.picture().expect("picture");
         let bounds = case.particles.bounds().unwrap_or_default();
-        let mut frame = case.camera.uniforms(&case.settings, case.size, case.particles.radius, bounds);
+        let space = match targets.get(&(Id::Extent, 0)) {
+            Some(extent) => Space::prepared(case.particles.radius, extent),
+            None => Space::of(&case.particles),
+        };
+        let mut frame = case.camera.uniforms(&case.settings, case.size, &space, bounds);
         frame.scene.w = f32::from(case.eye_inside);
-        Shot { frame, size: case.size, picture, targets }
+        Shot { frame, space, size: case.size, picture, targets }
     }
 }
 

@@ -1,12 +1,13 @@
 //! `--dump`: every intermediate target as .npy, so that any pass can be recomputed from the dump alone.
 
 use crate::{codes, render::Job};
-use glam::{DMat4, DVec3, Mat4};
+use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     Fresnel, Weighting,
     host::Session,
     io::images::write_file,
     shader::{SIDE_BACK, SIDE_FRONT},
+    space::Space,
     targets::Id,
     twin::normal::decode_normal,
 };
@@ -28,7 +29,7 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
             std::fs::remove_file(entry.path())?;
         }
     }
-    let out = Folder { path: folder, size: job.size };
+    let out = Folder { path: folder, size: job.size, radius: job.scene.particles.radius };
     let needs = session.renderer.needs(&job.settings, true);
     let smooth = (needs.body_depth(), needs.body_normal());
     let targets = [
@@ -46,7 +47,8 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     }
     let walk = floats(session.words(Id::Walk, 0)?);
     for (k, name) in ["pattern", "outcome", "hits", "path_length"].into_iter().enumerate() {
-        out.array(name, 1, walk.chunks_exact(4).map(|w| w[k]))?;
+        let unit = if name == "path_length" { out.radius } else { 1.0 };
+        out.array(name, 1, walk.chunks_exact(4).map(|w| w[k] * unit))?;
     }
     let direction = floats(session.words(Id::Direction, 0)?);
     out.array("final_direction", 3, direction.chunks_exact(4).flat_map(|d| [d[0], d[1], d[2]]))?;
@@ -66,6 +68,8 @@ fn floats(words: Option<Vec<u32>>) -> Vec<f32> {
 struct Folder<'a> {
     path: &'a Path,
     size: [u32; 2],
+    /// Shaders measure lengths in it, dumps in world units.
+    radius: f32,
 }
 
 impl Folder<'_> {
@@ -78,7 +82,7 @@ impl Folder<'_> {
     }
 
     fn maps(&self, surface: &str, raw: &str, depths: &[u32], normals: &[u32]) -> Result<()> {
-        let depth = |w: &u32| Some(f32::from_bits(*w)).filter(|d| *d > 0.0);
+        let depth = |w: &u32| Some(self.radius * f32::from_bits(*w)).filter(|d| *d > 0.0);
         self.array(&format!("{surface}_depth{raw}"), 1, depths.iter().map(|w| depth(w).unwrap_or(f32::NAN)))?;
         let normal = depths.iter().zip(normals).flat_map(|(d, n)| match depth(d) {
             Some(_) => decode_normal(*n).to_array(),
@@ -155,7 +159,8 @@ pub fn frame(job: &Job) -> serde_json::Value {
     let codes =
         |table: &[(u32, &'static str)]| table.iter().map(|(c, t)| (c.to_string(), *t)).collect::<BTreeMap<_, _>>();
     let bounds = job.scene.particles.bounds().unwrap_or_default();
-    let search = job.camera.uniforms(s, job.size, radius, bounds).search;
+    // In radii, whatever the origin.
+    let search = radius * job.camera.uniforms(s, job.size, &Space::new(radius, Vec3::ZERO), bounds).search;
     json!({
         "width": job.size[0],
         "height": job.size[1],

@@ -6,6 +6,7 @@ use meniscus::{
     host::{HostError, Session},
     prepare::{Report, ellipsoids::eigen_symmetric},
     shader as s,
+    space::Space,
     targets::Id,
 };
 
@@ -28,8 +29,11 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     let (centers, diagonals, mixed) = (array(Id::Centers)?, array(Id::Diagonals)?, array(Id::Mixed)?);
     let order = order(session, centers.len())?;
     let sphere = Mat3::from_diagonal(Vec3::splat(radius));
+    let space = words(session, Id::Extent)?;
+    let space = if space.is_empty() { Space::new(radius, Vec3::ZERO) } else { Space::prepared(radius, &space) };
     let (mut splash, mut body) = (Vec::new(), Vec::new());
     for (((center, d), m), index) in centers.into_iter().zip(diagonals).zip(mixed).zip(order) {
+        let center = space.world(center);
         if d.x < 0.0 {
             splash.push((Ellipsoid { center, axes: sphere }, index));
         } else if d.x > 0.0 {
