@@ -134,7 +134,10 @@ fn agrees(driver: &Driver, name: &str, radius: f32, positions: &[Vec3], options:
             ((*c - center).length() / radius - step).max(0.0) + shape
         };
         let (at, miss) = rest.iter().map(distance).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).expect("one is left");
-        rest.swap_remove(at);
+        // Where places are that coarse, several share one.
+        if step < 1.0 {
+            rest.swap_remove(at);
+        }
         worst = worst.max(miss);
         assert!(miss <= tolerance, "{label}: particle {i} is {miss} off: {center} {d} {m}");
     }
