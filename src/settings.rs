@@ -122,7 +122,9 @@ impl Camera {
     pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, fov_y: f32, aspect: f32, near: f32) -> Camera {
         use glam::camera::rh;
         let projection = rh::proj::vulkan::perspective_infinite(fov_y, aspect, near);
-        Camera { view: rh::view::look_at_mat4(eye, target, up), projection, near, up }
+        // In double precision: squares of lengths may not be float32 numbers.
+        let ahead = (target.as_dvec3() - eye.as_dvec3()).normalize().as_vec3();
+        Camera { view: rh::view::look_to_mat4(eye, ahead, up), projection, near, up }
     }
 
     /// Checks that this is a rigid view and a perspective projection.

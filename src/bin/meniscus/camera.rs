@@ -23,24 +23,26 @@ pub fn frame(
     if !(view.fov_y_deg > 0.0 && view.fov_y_deg < 170.0) {
         return Err(wrong("fov-y", view.fov_y_deg.to_string(), "use degrees above 0 and below 170"));
     }
-    let up = view.up.normalize().as_vec3();
+    let up = view.up.normalize();
     if !up.is_finite() {
         return Err(wrong("up", view.up.to_string(), "use a finite direction that is not zero"));
     }
     let fov = view.fov_y_deg.to_radians();
-    let local = |p: DVec3| (p - origin).as_vec3();
-    let (fit_eye, fit_target) = fit(up, fov, aspect, particles);
+    let local = |p: DVec3| p - origin;
+    let (fit_eye, fit_target) = fit(up, f64::from(fov), f64::from(aspect), particles);
     let target = view.target.map_or(fit_target, local);
     let eye = view.eye.map_or(fit_eye + (target - fit_target), local);
     let apart = (target - eye).normalize_or_zero();
-    if !(eye.is_finite() && target.is_finite()) || apart == Vec3::ZERO {
+    if !(eye.as_vec3().is_finite() && target.as_vec3().is_finite()) || apart == DVec3::ZERO {
         return Err(wrong("eye and target", format!("{eye} and {target}"), "use two different finite points"));
     }
     // Looking straight up or down, any other direction does for "up" on the screen.
     let screen_up = if apart.cross(up).length() < 1e-3 { apart.any_orthonormal_vector() } else { up };
-    let mut camera = Camera::look_at(eye, target, screen_up, fov, aspect, near);
-    camera.up = up;
-    Ok((camera, eye))
+    // A point of the line of sight that float32 tells from the eye, however near the target is.
+    let ahead = (eye + apart * eye.length().max((target - eye).length())).as_vec3();
+    let mut camera = Camera::look_at(eye.as_vec3(), ahead, screen_up.as_vec3(), fov, aspect, near);
+    camera.up = up.as_vec3();
+    Ok((camera, eye.as_vec3()))
 }
 
 fn wrong(parameter: &'static str, value: String, remedy: &str) -> Error {
@@ -48,14 +50,16 @@ fn wrong(parameter: &'static str, value: String, remedy: &str) -> Error {
 }
 
 /// Eye and target from which every particle is in view, as close as can be, along a fixed direction: from a little
-/// above, with the longer horizontal side across the picture.
-fn fit(up: Vec3, fov_y: f32, aspect: f32, particles: &Particles) -> (Vec3, Vec3) {
-    let (low, high) = particles.bounds().unwrap_or((Vec3::splat(-1.0), Vec3::splat(1.0)));
-    let extent = |d: Vec3| (high - low).dot(d.abs());
+/// above, with the longer horizontal side across the picture. In double precision, because squares of lengths occur, and
+/// scenes may be as small or large as float32 allows.
+fn fit(up: DVec3, fov_y: f64, aspect: f64, particles: &Particles) -> (DVec3, DVec3) {
+    let bounds = particles.bounds().map(|(low, high)| (low.as_dvec3(), high.as_dvec3()));
+    let (low, high) = bounds.unwrap_or((DVec3::splat(-1.0), DVec3::splat(1.0)));
+    let extent = |d: DVec3| (high - low).dot(d.abs());
     let (a, b) = if up.x.abs() < 0.9 {
-        (up.cross(Vec3::X).normalize(), Vec3::X)
+        (up.cross(DVec3::X).normalize(), DVec3::X)
     } else {
-        (Vec3::Z, Vec3::Z.cross(up).normalize())
+        (DVec3::Z, DVec3::Z.cross(up).normalize())
     };
     let (across, along) = if extent(a) > extent(b) { (a, b) } else { (b, a) };
     let back = (along + 0.35 * across + 0.30 * up).normalize();
@@ -64,12 +68,15 @@ fn fit(up: Vec3, fov_y: f32, aspect: f32, particles: &Particles) -> (Vec3, Vec3)
     let tan_y = (0.5 * fov_y).tan();
     // A point at (x, z) in (right, back) is in view of an eye at (c, D) if |x - c| <= (D - z) tan: the largest
     // x + z tan and -x + z tan over all points give the best c and D in closed form. The same holds for y.
-    let best = |axis: Vec3, tan: f32| {
-        let most = |sign: f32| {
-            let of = |e: &Ellipsoid| sign * e.center.dot(axis) + e.center.dot(back) * tan;
+    let best = |axis: DVec3, tan: f64| {
+        let most = |sign: f64| {
+            let of = |e: &Ellipsoid| {
+                let center = e.center.as_dvec3();
+                sign * center.dot(axis) + center.dot(back) * tan
+            };
             let corners = [low, high].map(|c| sign * c.dot(axis) + c.dot(back) * tan);
-            let widest = particles.ellipsoids.iter().map(of).reduce(f32::max).unwrap_or(corners[0].max(corners[1]));
-            widest + particles.radius
+            let widest = particles.ellipsoids.iter().map(of).reduce(f64::max).unwrap_or(corners[0].max(corners[1]));
+            widest + f64::from(particles.radius)
         };
         let (plus, minus) = (most(1.0), most(-1.0));
         (0.5 * (plus - minus), 0.5 * (plus + minus) / tan)
@@ -77,6 +84,6 @@ fn fit(up: Vec3, fov_y: f32, aspect: f32, particles: &Particles) -> (Vec3, Vec3)
     let ((cx, dx), (cy, dy)) = (best(right, tan_y * aspect), best(screen_up, tan_y));
     let middle = cx * right + cy * screen_up;
     let depth = 0.5 * (low + high).dot(back);
-    let distance = (dx.max(dy) - depth).max(1e-6) * 1.06;
+    let distance = (dx.max(dy) - depth).max(1e-3 * f64::from(particles.radius)) * 1.06;
     (middle + (depth + distance) * back, middle + depth * back)
 }

@@ -234,7 +234,7 @@ fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::er
             FresnelArg::Exact => Fresnel::Exact,
         },
         ior: args.ior,
-        absorption: args.absorption.map_or(Vec3::new(1.0, 0.35, 0.2) * (1.2 / (high - low).length()), |a| a.as_vec3()),
+        absorption: args.absorption.map_or(Vec3::new(1.0, 0.35, 0.2) * (1.2 / (high - low).as_dvec3().length()) as f32, |a| a.as_vec3()),
         // The window covers the same part of the picture at any supersampling.
         window: (args.window - 1) * s + 1,
         iterations: args.iterations,

@@ -93,8 +93,8 @@ impl Scene {
             },
         };
         let reach = positions.iter().fold(radius.abs(), |m, p| m.max(f64::from(p.abs().max_element())));
-        if reach.is_nan() || reach >= 1e15 {
-            return Err(format!("coordinates or radius reach {reach:e}: scale the scene to below 1e15").into());
+        if reach.is_nan() || reach >= 1e37 {
+            return Err(format!("coordinates or radius reach {reach:e}: scale the scene to below 1e37").into());
         }
         let classes: Option<Vec<Class>> = file
             .classes
