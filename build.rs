@@ -31,7 +31,13 @@ const SHADERS: &[(&str, &str, &[&str])] = &[
     ("TILES_COMP", "tiles.comp", &[]),
     ("REFRACT_VERT", "refract.vert", &[]),
     ("REFRACT_FRAG", "refract.frag", &[]),
+    ("REFRACT_CUBE_FRAG", "refract.frag", &["CUBE"]),
+    ("REFRACT_SCENE_FRAG", "refract.frag", &["SCENE"]),
+    ("REFRACT_SCENE_CUBE_FRAG", "refract.frag", &["SCENE", "CUBE"]),
     ("REFRACT_DEBUG_FRAG", "refract.frag", &["DEBUG"]),
+    ("REFRACT_DEBUG_CUBE_FRAG", "refract.frag", &["DEBUG", "CUBE"]),
+    ("REFRACT_DEBUG_SCENE_FRAG", "refract.frag", &["DEBUG", "SCENE"]),
+    ("REFRACT_DEBUG_SCENE_CUBE_FRAG", "refract.frag", &["DEBUG", "SCENE", "CUBE"]),
 ];
 
 fn main() {

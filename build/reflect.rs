@@ -12,6 +12,7 @@ pub struct Binding {
 // SPIR-V 1.6, section 3: the instructions, decorations and storage classes that matter here.
 const OP_NAME: u32 = 5;
 const OP_TYPE_IMAGE: u32 = 25;
+const OP_TYPE_SAMPLER: u32 = 26;
 const OP_TYPE_POINTER: u32 = 32;
 const OP_VARIABLE: u32 = 59;
 const OP_DECORATE: u32 = 71;
@@ -24,7 +25,7 @@ const STORAGE_BUFFER: u32 = 12;
 pub fn bindings(words: &[u32]) -> Result<Vec<Binding>, String> {
     let mut names = HashMap::new();
     let mut binding_of = HashMap::new();
-    let mut sampled_of = HashMap::new();
+    let mut kind_of = HashMap::new();
     let mut pointee = HashMap::new();
     let mut variables = Vec::new();
     let mut at = 5; // past the header
@@ -43,7 +44,10 @@ pub fn bindings(words: &[u32]) -> Result<Vec<Binding>, String> {
                 return Err(format!("descriptor set {}; passes use set 0 only", args[2]));
             }
             OP_TYPE_IMAGE => {
-                sampled_of.insert(args[0], args[6]);
+                kind_of.insert(args[0], if args[6] == 2 { "StorageImage" } else { "SampledImage" });
+            }
+            OP_TYPE_SAMPLER => {
+                kind_of.insert(args[0], "Sampler");
             }
             OP_TYPE_POINTER => {
                 pointee.insert(args[0], args[2]);
@@ -59,11 +63,9 @@ pub fn bindings(words: &[u32]) -> Result<Vec<Binding>, String> {
         let kind = match storage {
             UNIFORM => "UniformBuffer",
             STORAGE_BUFFER => "StorageBuffer",
-            UNIFORM_CONSTANT => match sampled_of.get(&pointee[&pointer]) {
-                Some(1) => "SampledImage",
-                Some(2) => "StorageImage",
-                other => return Err(format!("binding {index} has an image type {other:?} no pass uses")),
-            },
+            UNIFORM_CONSTANT => {
+                *kind_of.get(&pointee[&pointer]).ok_or(format!("binding {index} has a type no pass uses"))?
+            }
             other => return Err(format!("binding {index} has storage class {other} no pass uses")),
         };
         let name = names.get(&variable).cloned().unwrap_or_default();

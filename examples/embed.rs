@@ -116,17 +116,7 @@ fn main() -> Result<()> {
             let eye = Vec3::new(2.2 * angle.sin(), 0.6, 2.2 * angle.cos());
             let aspect = SIZE[0] as f32 / SIZE[1] as f32;
             let camera = Camera::look_at(eye, Vec3::ZERO, Vec3::Y, 0.7, aspect, 0.1);
-            let input = FrameInput {
-                slot: frame % IN_FLIGHT,
-                camera: &camera,
-                settings: &settings,
-                scene: None,
-                eye_inside: false,
-                output: s.view,
-                debug: false,
-                positions: None,
-                neighbours: 0,
-            };
+            let input = FrameInput::new(frame % IN_FLIGHT, &camera, &settings, s.view);
             renderer.record(s.cmd, &input)?;
             layout(&device, s, drawn, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
             let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);

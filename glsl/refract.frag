@@ -1,6 +1,11 @@
 // The walk of one view ray through up to two volumes of liquid, and the light it brings back (Imai16 sections 4.4,
 // 4.5, eqs. 6 to 9), with total internal reflection followed inside (beyond the paper).
-// DEBUG writes what the walk met beside the colour it writes anyway.
+// DEBUG writes what the walk met beside the colour it writes anyway. SCENE: there is an opaque scene of the host's. CUBE: the
+// environment is a cube map.
+//
+// No branch here, or in any other shader, may hang on uniforms alone: lavapipe inlines such values as constants, and with
+// Mesa 22.3 compiles the shader anew in every frame and keeps it (9 MB and 200 ms each). Mixed with something fetched, or
+// as a specialisation constant, the same condition costs nothing (tests/endurance.rs).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
@@ -13,16 +18,23 @@ layout(constant_id = 1) const uint INTERNAL_REFLECTIONS = 4;
 layout(constant_id = 2) const bool EXACT_FRESNEL = false;
 layout(constant_id = 3) const bool HAS_SPLASH = true;
 layout(constant_id = 4) const bool HAS_BODY = true;
-layout(constant_id = 5) const bool HAS_SCENE = false;
-layout(constant_id = 6) const bool ENCODE_SRGB = false;
+layout(constant_id = 5) const bool ENCODE_SRGB = false;
+layout(constant_id = 6) const bool HOST_BACKGROUND = false; // only liquid is drawn, over what is there
 layout(set = 0, binding = 1) uniform texture2DArray body_depth;
 layout(set = 0, binding = 2) uniform utexture2DArray body_normal;
 layout(set = 0, binding = 3) uniform texture2DArray splash_depth;
 layout(set = 0, binding = 4) uniform utexture2DArray splash_normal;
-layout(set = 0, binding = 5) uniform texture2D environment; // equirectangular, linear
-layout(set = 0, binding = 6) uniform texture2D scene_color; // the host's opaque scene, linear
-layout(set = 0, binding = 7) uniform texture2D scene_depth; // its depth buffer
-layout(set = 0, binding = 8) uniform texture2DArray front_tiles; // smallest, largest front depth
+layout(set = 0, binding = 5) uniform texture2DArray front_tiles; // smallest, largest front depth
+#ifdef CUBE
+layout(set = 0, binding = 6) uniform textureCube environment; // linear
+layout(set = 0, binding = 7) uniform sampler environment_sampler; // nearest
+#else
+layout(set = 0, binding = 6) uniform texture2D environment; // equirectangular, linear
+#endif
+#ifdef SCENE
+layout(set = 0, binding = 8) uniform texture2D scene_color; // the host's opaque scene, linear
+layout(set = 0, binding = 9) uniform texture2D scene_depth; // its depth buffer
+#endif
 layout(location = 0) out vec4 out_color;
 #ifdef DEBUG
 layout(location = 1) out vec4 out_walk;      // pattern, outcome, hits, length inside
@@ -47,7 +59,8 @@ void main() {
     float body = HAS_BODY ? map_depth(CLASS_BODY, SIDE_FRONT, pixel) : 0.0;
 
     // Negative: the near plane lies inside that class. The eye is inside the body where the host says so.
-    bool body_around = HAS_BODY && frame.scene.w != 0.0 && (REFRACTIONS == 1 || map_depth(CLASS_BODY, SIDE_BACK, pixel) > 0.0);
+    bool body_around = false;
+    if (HAS_BODY) body_around = frame.scene.w * (REFRACTIONS == 1 ? 1.0 : map_depth(CLASS_BODY, SIDE_BACK, pixel)) > 0.0;
     bool inside = body_around || body < 0.0 || splash < 0.0;
     int cls = body_around || body < 0.0 ? CLASS_BODY : CLASS_SPLASH;
     float depth = near;
@@ -56,6 +69,7 @@ void main() {
         depth = cls == CLASS_SPLASH ? splash : body;
     }
     if (depth <= 0.0 || scene_hides(pixel, depth)) {
+        if (HOST_BACKGROUND) discard;
         finish(behind(pixel, dir), PATTERN_NONE, OUTCOME_NO_LIQUID, 0.0, 0.0, dir, 0.0);
         return;
     }
@@ -65,6 +79,9 @@ void main() {
     int outcome = OUTCOME_HIT, doubt = OUTCOME_HIT, first = cls, second = -1;
     uint bounces = 0u;
     bool entering = !inside;
+#ifdef SCENE
+    ivec2 met; // where the ray ended on the scene
+#endif
     const uint volumes = REFRACTIONS == 1 ? 1u : REFRACTIONS / 2u;
     for (uint volume = 0u; volume < volumes && outcome == OUTCOME_HIT; ++volume) {
         if (entering) {
@@ -96,13 +113,22 @@ void main() {
                 found = OUTCOME_HIT;
             }
             outcome = found;
+            bool smooth_here = true;
+            vec3 n = dir;
+            if (outcome == OUTCOME_HIT) n = sample_normal(cls, side, project(x + t * dir), smooth_here);
+#ifdef SCENE
+            // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
+            float t_scene, gap = outcome == OUTCOME_HIT ? WETTED / max(abs(dot(dir, n)), 0.2) : 0.0;
+            if (meets_scene(in_view(x, dir, t + gap), t_scene, met)) {
+                t = t_scene;
+                outcome = OUTCOME_SCENE;
+            }
+#endif
             x += t * dir;
             length_inside += t;
             light *= exp(-frame.absorption.rgb * t);
             if (outcome != OUTCOME_HIT) break;
             hits += 1.0;
-            bool smooth_here;
-            vec3 n = sample_normal(cls, side, project(x), smooth_here);
             if (!smooth_here && doubt == OUTCOME_HIT) doubt = OUTCOME_PAST_JUMP;
             if (dot(dir, n) < 0.0) {
                 n = -n;
@@ -129,6 +155,13 @@ void main() {
         int found;
         bool jumped;
         int next = find_entry(trace(x, dir), t, found, jumped);
+#ifdef SCENE
+        float t_scene;
+        if (next >= 0 && meets_scene(in_view(x, dir, t), t_scene, met)) {
+            outcome = OUTCOME_SCENE;
+            break;
+        }
+#endif
         if (jumped && doubt == OUTCOME_HIT) doubt = OUTCOME_PAST_JUMP;
         if (next < 0) {
             outcome = found;
@@ -137,7 +170,12 @@ void main() {
         x += t * dir;
         cls = second = next;
     }
+#ifdef SCENE
+    if (outcome == OUTCOME_SCENE) color += light * scene_light(met);
+    else color += light * background(x, dir);
+#else
     color += light * background(x, dir);
+#endif
     int pattern = second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + second;
     finish(color, pattern, outcome == OUTCOME_HIT ? doubt : outcome, hits, length_inside, dir, flipped);
 }

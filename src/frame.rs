@@ -1,7 +1,10 @@
 //! THE FRAME, from top to bottom. Everything a frame does is a line here; each pass lives in `src/passes/` with its
 //! shader in `glsl/`, its CPU twin in `src/twin/` and its test in `tests/gpu/`, all under the same name.
 
-use crate::{Error, passes::Passes, recorder::Recorder, settings::Settings, shader::Prepare, targets::Needs};
+use crate::{
+    Error, passes::Passes, recorder::Recorder, renderer::Background, settings::Settings, shader::Prepare,
+    targets::Needs,
+};
 
 /// Records the passes of one frame. What a scene does not need is not there: no splash particles, no splash maps; one
 /// refraction, no back maps; no particles at all, only the background.
@@ -43,6 +46,9 @@ pub(crate) fn record(
         // Where rays outside the liquid need not look for a second volume.
         passes.tiles.record(r, needs)?;
     }
-    // Up to four refractions, and the light they bring back (Imai16 §4.4, §4.5).
-    passes.refract.record(r, needs, settings)
+    // Up to four refractions, and the light they bring back (Imai16 §4.4, §4.5). Without liquid the host's picture stays.
+    if needs.count > 0 || needs.debug || r.externals.background == Background::Environment {
+        passes.refract.record(r, needs, settings)?;
+    }
+    Ok(())
 }

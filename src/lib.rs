@@ -56,5 +56,5 @@ pub use device::Host;
 pub use environment::Equirect;
 pub use error::Error;
 pub use particles::{Class, Ellipsoid, Particles};
-pub use renderer::{FrameInput, Renderer, SceneInput};
+pub use renderer::{Background, EnvironmentInput, EnvironmentShape, FrameInput, Renderer, SceneInput};
 pub use settings::{Camera, Fresnel, Settings, Weighting};

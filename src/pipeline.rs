@@ -1,6 +1,10 @@
 //! Pipelines, laid out from the shaders' own reflection.
 
-use crate::{Error, device::Host, shader::Shader};
+use crate::{
+    Error,
+    device::Host,
+    shader::{Kind, Shader},
+};
 use ash::vk;
 
 /// A pipeline, its layouts, and the bindings its descriptor set has.
@@ -11,6 +15,8 @@ pub(crate) struct Pipeline {
     pub bindings: Vec<crate::shader::Binding>,
     pub bind_point: vk::PipelineBindPoint,
     pub stages: vk::ShaderStageFlags,
+    /// Part of the set layout; null where the shader has none.
+    sampler: vk::Sampler,
 }
 
 /// What a graphics pipeline of this library differs in.
@@ -63,41 +69,54 @@ impl Pipeline {
             }
         }
         let name = shaders[0].name;
-        let infos: Vec<_> = bindings
-            .iter()
-            .map(|b| {
-                vk::DescriptorSetLayoutBinding::default()
-                    .binding(b.index)
-                    .descriptor_type(b.kind.descriptor_type())
-                    .descriptor_count(1)
-                    .stage_flags(stages)
-            })
-            .collect();
-        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&infos);
-        // SAFETY: complete infos on a live device; on failure below the set layout is destroyed with the struct.
-        let set_layout =
-            unsafe { host.device.create_descriptor_set_layout(&info, None) }.map_err(Error::vulkan(name))?;
         let mut pipeline = Pipeline {
             handle: vk::Pipeline::null(),
             layout: vk::PipelineLayout::null(),
-            set_layout,
+            set_layout: vk::DescriptorSetLayout::null(),
             bindings,
             bind_point,
             stages,
+            sampler: vk::Sampler::null(),
         };
-        let range = [vk::PushConstantRange { stage_flags: stages, offset: 0, size: push_bytes }];
-        let info = vk::PipelineLayoutCreateInfo::default()
-            .set_layouts(std::slice::from_ref(&pipeline.set_layout))
-            .push_constant_ranges(if push_bytes > 0 { &range } else { &[] });
-        // SAFETY: as above.
-        match unsafe { host.device.create_pipeline_layout(&info, None) } {
-            Ok(layout) => pipeline.layout = layout,
+        match pipeline.make_layouts(host, push_bytes) {
+            Ok(()) => Ok(pipeline),
             Err(e) => {
                 pipeline.destroy(host);
-                return Err(Error::vulkan(name)(e));
+                Err(Error::vulkan(name)(e))
             }
         }
-        Ok(pipeline)
+    }
+
+    fn make_layouts(&mut self, host: &Host, push_bytes: u32) -> Result<(), vk::Result> {
+        if self.bindings.iter().any(|b| b.kind == Kind::Sampler) {
+            let edge = vk::SamplerAddressMode::CLAMP_TO_EDGE;
+            let info = vk::SamplerCreateInfo::default().address_mode_u(edge).address_mode_v(edge).address_mode_w(edge);
+            // SAFETY: a complete info on a live device; what is made here is destroyed with the struct.
+            self.sampler = unsafe { host.device.create_sampler(&info, None) }?;
+        }
+        let samplers = [self.sampler];
+        let infos: Vec<_> = self
+            .bindings
+            .iter()
+            .map(|b| {
+                let info = vk::DescriptorSetLayoutBinding::default()
+                    .binding(b.index)
+                    .descriptor_type(b.kind.descriptor_type())
+                    .descriptor_count(1)
+                    .stage_flags(self.stages);
+                if b.kind == Kind::Sampler { info.immutable_samplers(&samplers) } else { info }
+            })
+            .collect();
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&infos);
+        // SAFETY: as above.
+        self.set_layout = unsafe { host.device.create_descriptor_set_layout(&info, None) }?;
+        let range = [vk::PushConstantRange { stage_flags: self.stages, offset: 0, size: push_bytes }];
+        let info = vk::PipelineLayoutCreateInfo::default()
+            .set_layouts(std::slice::from_ref(&self.set_layout))
+            .push_constant_ranges(if push_bytes > 0 { &range } else { &[] });
+        // SAFETY: as above.
+        self.layout = unsafe { host.device.create_pipeline_layout(&info, None) }?;
+        Ok(())
     }
 
     pub fn compute(host: &Host, shader: &Shader, constants: &[u32], push_bytes: u32) -> Result<Pipeline, Error> {
@@ -197,6 +216,7 @@ impl Pipeline {
             host.device.destroy_pipeline(self.handle, None);
             host.device.destroy_pipeline_layout(self.layout, None);
             host.device.destroy_descriptor_set_layout(self.set_layout, None);
+            host.device.destroy_sampler(self.sampler, None);
         }
     }
 }

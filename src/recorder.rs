@@ -6,6 +6,7 @@ use crate::{
     device::Host,
     pipeline::Pipeline,
     profile::Profiler,
+    renderer::{Background, EnvironmentShape, SceneInput},
     resources::{Buffer, Image, Resource, Retired},
     shader::Kind,
     targets::{Id, Needs, Spec},
@@ -110,9 +111,10 @@ pub(crate) struct Externals {
     pub positions: (vk::Buffer, u64, u64),
     /// Centres and shapes, where the host prepared them.
     pub particles: [vk::Buffer; 3],
-    pub environment: vk::ImageView,
-    pub scene_color: (vk::ImageView, vk::ImageLayout),
-    pub scene_depth: (vk::ImageView, vk::ImageLayout),
+    pub environment: (vk::ImageView, vk::ImageLayout),
+    pub environment_shape: EnvironmentShape,
+    pub scene: Option<SceneInput>,
+    pub background: Background,
     pub output: vk::ImageView,
 }
 
@@ -218,7 +220,8 @@ impl Recorder<'_> {
         let frame_block = bound(0, Id::FrameBlock, Access::ComputeRead);
         let mut image_infos = Vec::with_capacity(pipeline.bindings.len());
         let mut buffer_infos = Vec::with_capacity(pipeline.bindings.len());
-        for b in &pipeline.bindings {
+        // Samplers are part of the layout.
+        for b in pipeline.bindings.iter().filter(|b| b.kind != Kind::Sampler) {
             let u = if b.index == 0 { Some(&frame_block) } else { uses.iter().find(|u| u.binding == Some(b.index)) };
             let u = u
                 .unwrap_or_else(|| panic!("a pass declares nothing for its shader's binding {} ({})", b.index, b.name));
@@ -235,6 +238,7 @@ impl Recorder<'_> {
                     let info = vk::DescriptorBufferInfo { buffer, offset, range };
                     buffer_infos.push((b, [info]));
                 }
+                Kind::Sampler => {}
             }
         }
         let mut writes = Vec::with_capacity(pipeline.bindings.len());
@@ -279,19 +283,19 @@ impl Recorder<'_> {
         unsafe { self.host.device.cmd_dispatch_indirect(self.cmd, self.buffer(arguments), offset) };
     }
 
-    /// Rendering into one layer of each colour target (or the host's output), all cleared to zero; `depth`: the
-    /// depth test's clear value.
+    /// Rendering into one layer of each colour target, cleared to zero, or into the host's output, which keeps what it
+    /// holds where the background is the host's; `depth`: the depth test's clear value.
     pub fn render(
         &mut self,
         colors: &[(Id, usize)],
         depth: Option<f32>,
         body: impl FnOnce(&mut Self) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let attachment = |view, layout, value| {
+        let attachment = |view, layout, load, value| {
             vk::RenderingAttachmentInfo::default()
                 .image_view(view)
                 .image_layout(layout)
-                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .load_op(load)
                 .store_op(vk::AttachmentStoreOp::STORE)
                 .clear_value(value)
         };
@@ -299,11 +303,14 @@ impl Recorder<'_> {
         let color_infos: Vec<_> = colors
             .iter()
             .map(|(id, layer)| {
-                let view = match self.table.get(*id) {
-                    Some(Resource::Image(i)) => i.layers[*layer],
-                    _ => self.externals.output,
+                let (view, load) = match self.table.get(*id) {
+                    Some(Resource::Image(i)) => (i.layers[*layer], vk::AttachmentLoadOp::CLEAR),
+                    _ if self.externals.background == Background::Host => {
+                        (self.externals.output, vk::AttachmentLoadOp::LOAD)
+                    }
+                    _ => (self.externals.output, vk::AttachmentLoadOp::CLEAR),
                 };
-                attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, zero)
+                attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, load, zero)
             })
             .collect();
         let area = vk::Rect2D {
@@ -314,7 +321,8 @@ impl Recorder<'_> {
         let depth_info;
         if let (Some(value), Some(Resource::Image(i))) = (depth, self.table.get(Id::SplatDepth)) {
             let clear = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: value, stencil: 0 } };
-            depth_info = attachment(i.view, vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL, clear)
+            let layout = vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL;
+            depth_info = attachment(i.view, layout, vk::AttachmentLoadOp::CLEAR, clear)
                 .store_op(vk::AttachmentStoreOp::DONT_CARE);
             info = info.depth_attachment(&depth_info);
         }
@@ -350,11 +358,15 @@ impl Recorder<'_> {
     }
 
     fn view(&self, u: &Use) -> (vk::ImageView, vk::ImageLayout) {
-        let read = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+        if let Some(scene) = &self.externals.scene {
+            match u.id {
+                Id::SceneColor => return (scene.color, scene.color_layout),
+                Id::SceneDepth => return (scene.depth, scene.depth_layout),
+                _ => {}
+            }
+        }
         match (u.id, self.table.get(u.id)) {
-            (Id::Environment, _) => (self.externals.environment, read),
-            (Id::SceneColor, _) => self.externals.scene_color,
-            (Id::SceneDepth, _) => self.externals.scene_depth,
+            (Id::Environment, _) => self.externals.environment,
             (_, Some(Resource::Image(i))) => (i.view, u.access.flags().2),
             _ => panic!("a pass asks for the image {:?}, which this frame does without", u.id),
         }

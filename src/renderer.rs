@@ -20,7 +20,42 @@ use ash::vk;
 use glam::{Vec3, Vec4};
 use uploads::PARTICLE_ARRAYS;
 
-/// The host's opaque scene, rendered before the liquid at the same size and with the same camera.
+/// What a frame shows where no liquid is, and what rays bring back that meet neither liquid nor scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Background {
+    /// The environment, and before it the scene: every pixel of the output is written, with alpha 1. What the output held
+    /// is lost, and where the scene's depth is cleared, so is its colour.
+    #[default]
+    Environment,
+    /// The host's own picture: the output is loaded, and only pixels that show liquid are written, with alpha 1, so that
+    /// alpha is the liquid's coverage where the host cleared it to 0. Rays that meet nothing take the scene's colour where
+    /// its depth is cleared in the direction they go (the host's sky), and the environment where that is out of view.
+    Host,
+}
+
+/// An environment of the host's own, in place of [`Renderer::set_environment`]'s.
+#[derive(Clone, Copy, Debug)]
+pub struct EnvironmentInput {
+    /// Linear light, infinitely far away, sampled in the fragment stage; mip level 0 is used.
+    pub view: vk::ImageView,
+    /// Layout it is in, before and after.
+    pub layout: vk::ImageLayout,
+    /// How directions find their texel.
+    pub shape: EnvironmentShape,
+}
+
+/// How an environment maps directions; those of the world, turned so that [`Camera::up`] becomes +y.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EnvironmentShape {
+    /// A `TYPE_2D` view, laid out as [`crate::Equirect`] is.
+    #[default]
+    Equirect,
+    /// A `TYPE_CUBE` view, looked up by the direction itself, as Vulkan defines it.
+    Cube,
+}
+
+/// The host's opaque scene, rendered before the liquid at the same size and with the same camera. It hides liquid, is seen
+/// through it, and ends rays under water: liquid whose wall lies a few radii before an opaque surface touches it.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneInput {
     /// Linear colour, sampled in the fragment stage.
@@ -31,7 +66,7 @@ pub struct SceneInput {
     pub depth: vk::ImageView,
     /// Layout the depth is in, before and after.
     pub depth_layout: vk::ImageLayout,
-    /// Depth value where nothing was drawn: the environment is seen there.
+    /// Depth value where nothing was drawn: what is infinitely far away is seen there (see [`Background`]).
     pub cleared_depth: f32,
 }
 
@@ -48,6 +83,10 @@ pub struct FrameInput<'a> {
     pub positions: Option<DevicePositions>,
     /// Host's opaque scene, if there is one.
     pub scene: Option<SceneInput>,
+    /// What is seen where no liquid is.
+    pub background: Background,
+    /// Host's own environment; without one that of [`Renderer::set_environment`].
+    pub environment: Option<EnvironmentInput>,
     /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it.
     pub eye_inside: bool,
     /// Output, of the format given to [`Renderer::new`] and the size given to [`Renderer::resize`], in
@@ -58,6 +97,25 @@ pub struct FrameInput<'a> {
     /// Where positions are prepared on the device, also list so many neighbours of every particle in [`Id::Neighbours`]:
     /// for each its index, how many there are, and the indices of the first of them; 0 lists none. For tests and dumps.
     pub neighbours: u32,
+}
+
+impl<'a> FrameInput<'a> {
+    /// A frame of the particles last given, before the environment alone; anything else by struct update.
+    pub fn new(slot: usize, camera: &'a Camera, settings: &'a Settings, output: vk::ImageView) -> FrameInput<'a> {
+        FrameInput {
+            slot,
+            camera,
+            settings,
+            positions: None,
+            scene: None,
+            background: Background::Environment,
+            environment: None,
+            eye_inside: false,
+            output,
+            debug: false,
+            neighbours: 0,
+        }
+    }
 }
 
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
@@ -120,7 +178,12 @@ impl Renderer {
             retired: Retired::default(),
             frame: 0,
             particles: None,
-            scene: SceneBounds { space: Space::new(1.0, Vec3::ZERO), splash: 0, body: 0, bounds: (Vec3::ZERO, Vec3::ZERO) },
+            scene: SceneBounds {
+                space: Space::new(1.0, Vec3::ZERO),
+                splash: 0,
+                body: 0,
+                bounds: (Vec3::ZERO, Vec3::ZERO),
+            },
             environment: None,
             plan: Vec::new(),
             last_classes: None,
@@ -232,9 +295,15 @@ impl Renderer {
         if self.size == [0, 0] {
             return Err(Error::Order("no size yet: call Renderer::resize first"));
         }
-        let Some(environment) = self.environment.as_ref().map(|i| i.view) else {
+        let own = self.environment.as_ref().map(|i| EnvironmentInput {
+            view: i.view,
+            layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+            shape: EnvironmentShape::Equirect,
+        });
+        let Some(environment) = input.environment.or(own) else {
             return Err(Error::Order(
-                "no environment yet: call Renderer::set_environment first (Equirect::procedural_sky needs no file)",
+                "no environment yet: give FrameInput::environment, or call Renderer::set_environment first \
+                 (Equirect::procedural_sky needs no file)",
             ));
         };
         let mut bounds = self.scene.bounds;
@@ -282,23 +351,22 @@ impl Renderer {
         block.particles.z = self.limits.point_size as u32;
         block.particles.w = u32::from(input.settings.quads_only || self.limits.point_size <= 1.0);
         block.scene.w = f32::from(input.eye_inside);
-        let mut externals = Externals {
+        let externals = Externals {
             frame_block: slot.frame_block.handle,
             positions,
             particles: self
                 .particles
                 .as_ref()
                 .map_or([vk::Buffer::null(); 3], |b| [&b[0], &b[1], &b[2]].map(|b| b.handle)),
-            environment,
-            scene_color: (environment, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
-            scene_depth: (environment, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
+            environment: (environment.view, environment.layout),
+            environment_shape: environment.shape,
+            scene: input.scene,
+            background: input.background,
             output: input.output,
         };
         if let Some(scene) = &input.scene {
             let p = &input.camera.projection;
             block.scene = Vec4::new(p.z_axis.z, p.w_axis.z / space.radius as f32, scene.cleared_depth, block.scene.w);
-            externals.scene_color = (scene.color, scene.color_layout);
-            externals.scene_depth = (scene.depth, scene.depth_layout);
         }
         slot.frame_block.mapped()[..size_of_val(&block)].copy_from_slice(bytemuck::bytes_of(&block));
         // SAFETY: no set of this slot is in use (contract).
@@ -368,9 +436,10 @@ impl Renderer {
                 frame_block: vk::Buffer::null(),
                 positions: Default::default(),
                 particles: [vk::Buffer::null(); 3],
-                environment: vk::ImageView::null(),
-                scene_color: Default::default(),
-                scene_depth: Default::default(),
+                environment: Default::default(),
+                environment_shape: EnvironmentShape::default(),
+                scene: None,
+                background: Background::default(),
                 output: vk::ImageView::null(),
             },
             pool: vk::DescriptorPool::null(),

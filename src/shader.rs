@@ -34,6 +34,8 @@ pub enum Kind {
     UniformBuffer,
     /// `buffer … {}`.
     StorageBuffer,
+    /// `sampler`, always the same: nearest, clamped.
+    Sampler,
 }
 
 impl Kind {
@@ -44,6 +46,7 @@ impl Kind {
             Kind::StorageImage => T::STORAGE_IMAGE,
             Kind::UniformBuffer => T::UNIFORM_BUFFER,
             Kind::StorageBuffer => T::STORAGE_BUFFER,
+            Kind::Sampler => T::SAMPLER,
         }
     }
 }

@@ -24,6 +24,7 @@ impl Slot {
             size(vk::DescriptorType::STORAGE_BUFFER, 8),
             size(vk::DescriptorType::SAMPLED_IMAGE, 8),
             size(vk::DescriptorType::STORAGE_IMAGE, 1),
+            size(vk::DescriptorType::SAMPLER, 1),
         ];
         // The extent pass completes it where positions are prepared on the device.
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;

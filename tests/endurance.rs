@@ -28,9 +28,15 @@ fn memory_and_time_stay_flat() {
         let instance = Instance::new(false).expect("instance");
         let gpu = Gpu::new(&instance, instance.pick(Some(&d.name)).expect("device")).expect("device");
         let positions = ball(0.05);
-        for (refractions, iterations, on_device, inside) in
-            [(1, 0, false, false), (1, 2, false, false), (2, 0, false, false), (4, 0, false, false), (4, 2, false, false), (4, 2, true, false), (4, 0, false, true)]
-        {
+        for (refractions, iterations, on_device, inside) in [
+            (1, 0, false, false),
+            (1, 2, false, false),
+            (2, 0, false, false),
+            (4, 0, false, false),
+            (4, 2, false, false),
+            (4, 2, true, false),
+            (4, 0, false, true),
+        ] {
             let size = [16, 12];
             let mut session = Session::new(&gpu, size, &Equirect::new(2, 1, &[[0.5; 3]; 2]).unwrap()).expect("session");
             let settings = Settings { refractions, iterations, ..Settings::default() };
@@ -48,15 +54,9 @@ fn memory_and_time_stay_flat() {
                 let positions = on_device.then(|| DevicePositions::packed(upload.buffer, positions.len() as u32, 0.05));
                 session
                     .frame(&FrameInput {
-                        slot: 0,
-                        camera: &camera,
-                        settings: &settings,
-                        scene: None,
                         eye_inside: inside,
-                        output: ash::vk::ImageView::null(),
-                        debug: false,
                         positions,
-                        neighbours: 0,
+                        ..FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null())
                     })
                     .unwrap();
             }

@@ -1,5 +1,31 @@
-// What a ray that meets no more liquid brings back: the host's opaque scene where it meets that, else the environment.
+// What a ray that meets no more liquid brings back: the host's opaque scene where it meets that, else what is infinitely
+// far away.
 
+#ifdef CUBE
+vec3 env_texel(ivec2 p, float size, int axis, float side) {
+    // A texel beyond the face's edge is the one next to that edge on the neighbouring face.
+    vec2 q = clamp((2.0 * vec2(p) + 1.0) / size - 1.0, -1.0, 1.0);
+    bool beyond_u = abs(q.x) == 1.0;
+    if (beyond_u) q.y = clamp(q.y, 1.0 / size - 1.0, 1.0 - 1.0 / size); // past a corner there is no texel
+    vec3 dir;
+    dir[axis] = side * (beyond_u || abs(q.y) == 1.0 ? 1.0 - 1.0 / size : 1.0);
+    dir[(axis + 1) % 3] = q.x;
+    dir[(axis + 2) % 3] = q.y;
+    return textureLod(samplerCube(environment, environment_sampler), dir, 0.0).rgb;
+}
+
+// Cube lookup, bilinear by hand and across edges: samplers interpolate with few bits, and not every format.
+vec3 env_color(vec3 dir) {
+    vec3 w = mat3(frame.eye_to_env) * dir, a = abs(w);
+    int axis = a.x >= a.y && a.x >= a.z ? 0 : (a.y >= a.z ? 1 : 2);
+    float size = float(textureSize(environment, 0).x), side = w[axis] < 0.0 ? -1.0 : 1.0;
+    vec2 on_face = vec2(w[(axis + 1) % 3], w[(axis + 2) % 3]) / a[axis];
+    vec2 q = (0.5 * on_face + 0.5) * size - 0.5, b = floor(q), f = q - b;
+    ivec2 p = ivec2(b);
+    return mix(mix(env_texel(p, size, axis, side), env_texel(p + ivec2(1, 0), size, axis, side), f.x),
+               mix(env_texel(p + ivec2(0, 1), size, axis, side), env_texel(p + ivec2(1, 1), size, axis, side), f.x), f.y);
+}
+#else
 vec3 env_texel(ivec2 p, ivec2 size) {
     p.x = p.x < 0 ? p.x + size.x : (p.x >= size.x ? p.x - size.x : p.x);
     return texelFetch(environment, ivec2(p.x, clamp(p.y, 0, size.y - 1)), 0).rgb;
@@ -16,38 +42,67 @@ vec3 env_color(vec3 dir) {
     return mix(mix(env_texel(p, size), env_texel(p + ivec2(1, 0), size), f.x),
                mix(env_texel(p + ivec2(0, 1), size), env_texel(p + ivec2(1, 1), size), f.x), f.y);
 }
+#endif
 
-// Linear depth of the host's scene; a huge value where it was cleared.
+#ifdef SCENE
+const float CLEARED = 1e30; // linear depth where the host drew nothing
+
 float scene_linear(ivec2 p) {
     float z = texelFetch(scene_depth, p, 0).x;
-    return z == frame.scene.z ? 1e30 : frame.scene.y / (z + frame.scene.x);
+    return z == frame.scene.z ? CLEARED : frame.scene.y / (z + frame.scene.x);
 }
 
-bool scene_hides(ivec2 pixel, float depth) { return HAS_SCENE && scene_linear(pixel) < depth; }
+bool scene_hides(ivec2 pixel, float depth) { return scene_linear(pixel) < depth; }
 
-// The background straight through a pixel.
-vec3 behind(ivec2 pixel, vec3 dir) {
-    if (HAS_SCENE && scene_linear(pixel) < 1e30) return texelFetch(scene_color, pixel, 0).rgb;
-    return env_color(dir);
+// Where a ray first meets the scene, pixel by pixel: within a pixel it passes that pixel's depth, or it enters a pixel a
+// little behind its depth and was in front of the scene before, so that the surface lies between two pixels. Further
+// behind, it passes behind an object.
+bool meets_scene(Ray ray, out float t, out ivec2 pixel) {
+    vec2 p0 = project(ray.origin), way = project(ray.origin + ray.reach * ray.dir) - p0;
+    float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);
+    float nudge = PIXEL_NUDGE / max(ray.span, 1e-6), at = 0.0;
+    bool before = true;
+    int most = int(frame.viewport.x + frame.viewport.y) + 4; // no line crosses more pixels
+    for (int i = 0; i < most && at < 1.0; ++i) {
+        pixel = nearest(p0 + min(at + nudge, 1.0) * way);
+        float end = leaves_cell(p0, way, pixel, 1, at + nudge);
+        float d_at = 1.0 / mix(k0, k1, at), d_end = 1.0 / mix(k0, k1, end), surface = scene_linear(pixel);
+        float behind = d_at - surface;
+        bool between = before && behind > 0.0 && behind <= surface * max(SCENE_BEHIND, STEEP / abs(frame.to_pixel.x));
+        if (between || (behind <= 0.0 && surface <= d_end)) {
+            t = pixel_to_t(ray, between || k1 == k0 ? at : clamp((1.0 / surface - k0) / (k1 - k0), at, end));
+            return true;
+        }
+        before = d_end <= surface;
+        at = end;
+    }
+    t = ray.reach;
+    return false;
 }
 
-// Marches a pixel at a time until the ray passes behind the scene's depth; accepts the crossing where the ray is less
-// than one step behind, so that things it passes far behind do not catch it.
-vec3 background(vec3 x, vec3 dir) {
-    if (!HAS_SCENE) return env_color(dir);
-    float d0 = -x.z, dd = -dir.z;
-    // The far end: the vanishing point for rays going away, the near plane for rays coming back.
-    float reach = dd < 0.0 ? max(d0 - frame.viewport.z, 0.0) / -dd : 1e3 * d0;
-    vec2 p0 = project(x), p1 = project(x + reach * dir);
-    float k0 = 1.0 / d0, k1 = 1.0 / (d0 + reach * dd);
-    float span = max(distance(p0, p1), 1.0), d_last = d0;
-    for (float i = 1.0; i <= min(span, float(MARCH_STEPS)); ++i) {
-        vec2 p = mix(p0, p1, i / span);
-        if (any(lessThan(p, vec2(0.0))) || any(greaterThanEqual(p, frame.viewport.xy))) break;
-        float d = 1.0 / mix(k0, k1, i / span), surface = scene_linear(ivec2(p));
-        if (d >= surface && min(d, d_last) <= surface + abs(d - d_last) + 0.01 * surface)
-            return texelFetch(scene_color, ivec2(p), 0).rgb;
-        d_last = d;
+vec3 scene_light(ivec2 pixel) { return texelFetch(scene_color, pixel, 0).rgb; }
+
+// Light from where a ray ends that meets neither liquid nor scene.
+vec3 infinitely_far(vec3 dir) {
+    if (HOST_BACKGROUND && dir.z < 0.0) {
+        // The host's own sky, where it is in the view.
+        vec2 p = project(dir);
+        if (all(greaterThanEqual(p, vec2(0.0))) && all(lessThan(p, frame.viewport.xy)) && scene_linear(ivec2(p)) == CLEARED)
+            return scene_light(ivec2(p));
     }
     return env_color(dir);
 }
+
+// The background straight through a pixel.
+vec3 behind(ivec2 pixel, vec3 dir) { return scene_linear(pixel) < CLEARED ? scene_light(pixel) : env_color(dir); }
+
+vec3 background(vec3 x, vec3 dir) {
+    float t;
+    ivec2 pixel;
+    return meets_scene(in_view(x, dir, 1e20), t, pixel) ? scene_light(pixel) : infinitely_far(dir);
+}
+#else
+bool scene_hides(ivec2 pixel, float depth) { return false; }
+vec3 behind(ivec2 pixel, vec3 dir) { return env_color(dir); }
+vec3 background(vec3 x, vec3 dir) { return env_color(dir); }
+#endif

@@ -63,13 +63,8 @@ float pixel_to_t(Ray ray, float share) {
     return ray.reach * share * d0 / mix(d1, d0, share);
 }
 
-Ray trace(vec3 origin, vec3 dir) {
-    // Leave the box around the liquid (world space).
-    mat3 to_world = transpose(mat3(frame.view));
-    vec3 o = to_world * (origin - frame.view[3].xyz), w = to_world * dir;
-    vec3 far_side = mix(frame.bounds_min.xyz, frame.bounds_max.xyz, greaterThan(w, vec3(0.0)));
-    vec3 t = mix((far_side - o) / w, vec3(1e30), lessThan(abs(w), vec3(1e-12)));
-    float reach = max(min(t.x, min(t.y, t.z)), 0.0);
+// A ray up to t = reach, as far as it stays in the view.
+Ray in_view(vec3 origin, vec3 dir, float reach) {
     float d0 = -origin.z, dd = -dir.z;
     if (dd < 0.0) reach = min(reach, max(d0 - frame.viewport.z, 0.0) / -dd);
     // The view's border: pixel(t) = b + a x / d meets p where a (x0 + t wx) = (p - b) (d0 + t dd).
@@ -89,6 +84,15 @@ Ray trace(vec3 origin, vec3 dir) {
     Ray ray = Ray(origin, dir, reach, 0.0, leaves);
     ray.span = distance(project(origin), project(origin + reach * dir));
     return ray;
+}
+
+// A ray as far as it stays in the view and in the box around the liquid.
+Ray trace(vec3 origin, vec3 dir) {
+    mat3 from_eye = transpose(mat3(frame.view));
+    vec3 o = from_eye * (origin - frame.view[3].xyz), w = from_eye * dir;
+    vec3 far_side = mix(frame.bounds_min.xyz, frame.bounds_max.xyz, greaterThan(w, vec3(0.0)));
+    vec3 t = mix((far_side - o) / w, vec3(1e30), lessThan(abs(w), vec3(1e-12)));
+    return in_view(origin, dir, max(min(t.x, min(t.y, t.z)), 0.0));
 }
 
 // f at t. The difference of depths is formed before t enters, so that it rounds at its own size.

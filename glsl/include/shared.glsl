@@ -25,7 +25,8 @@
 #define PATTERN_BODY_BODY 6
 
 // How a pixel's walk ended. Past a jump: every surface was found, but on the way to one the map ahead jumped, and an
-// unseen wall may stand before it, or beside it, where it is not interpolated. Other wall: every surface was found, one of them across the ray's way.
+// unseen wall may stand before it, or beside it, where it is not interpolated. Other wall: every surface was found, one of
+// them across the ray's way. Scene: the ray ended on the host's scene.
 #define OUTCOME_NO_LIQUID 0
 #define OUTCOME_HIT 1
 #define OUTCOME_LEFT_VIEW 2
@@ -34,6 +35,7 @@
 #define OUTCOME_REFLECTION_LIMIT 5
 #define OUTCOME_PAST_JUMP 6
 #define OUTCOME_OTHER_WALL 7
+#define OUTCOME_SCENE 8
 
 // Which particles a class draws on which side; bits of the cull pass's verdict.
 #define VISIBLE_FRONT 1
@@ -114,6 +116,13 @@
 #define MARCH_STEPS 1024
 #define REFINE_STEPS 24
 #define EDGE_STEPS 10
+
+// The host's scene: as a share of its depth, how far behind it a ray may come to lie from one pixel to the next and still
+// meet it; a floor seen at 5 degrees falls off so much in a picture of 768 rows. And how near before it, in particle radii,
+// the liquid's wall may lie and still wet it: particles stop a radius before a floor, and ellipsoids shrunk as YuTurk13 has
+// it two and a half radii more.
+#define SCENE_BEHIND 0.01
+#define WETTED 3.5
 
 // Tangent of the steepest surface (81 degrees against the view plane) for which strides are made short.
 #define STEEP 6.0

@@ -6,17 +6,30 @@ use crate::{
     access::Access,
     pipeline::{Graphics, Pipeline},
     recorder::{Recorder, bound, used},
+    renderer::{Background, EnvironmentShape},
     settings::{Fresnel, Settings},
-    shader::{self, REFRACT_VERT},
+    shader::{self, REFRACT_VERT, Shader},
     targets::{Id, Needs},
 };
 use ash::vk;
 
 pub(crate) struct Refract {
-    /// By specialisation, and whether it writes what the walk met.
-    pub pipelines: Pipelines<([u32; 7], bool)>,
+    /// By specialisation, and place in [`FRAGMENT`].
+    pub pipelines: Pipelines<([u32; 7], [usize; 3])>,
     output: vk::Format,
 }
+
+/// By whether it writes what the walk met, whether there is a scene, and whether the environment is a cube.
+static FRAGMENT: [[[&Shader; 2]; 2]; 2] = [
+    [
+        [&shader::REFRACT_FRAG, &shader::REFRACT_CUBE_FRAG],
+        [&shader::REFRACT_SCENE_FRAG, &shader::REFRACT_SCENE_CUBE_FRAG],
+    ],
+    [
+        [&shader::REFRACT_DEBUG_FRAG, &shader::REFRACT_DEBUG_CUBE_FRAG],
+        [&shader::REFRACT_DEBUG_SCENE_FRAG, &shader::REFRACT_DEBUG_SCENE_CUBE_FRAG],
+    ],
+];
 
 /// Whether a format takes light as it is (float, or sRGB, which the hardware encodes) or encoded by the shader (UNORM);
 /// `None` for formats that cannot hold a picture.
@@ -37,6 +50,8 @@ impl Refract {
     }
 
     pub fn record(&mut self, r: &mut Recorder, needs: &Needs, settings: &Settings) -> Result<(), Error> {
+        let has_scene = r.externals.scene.is_some();
+        let cube = r.externals.environment_shape == EnvironmentShape::Cube;
         let (splash, body) = (needs.splash, needs.body);
         let ((body_depth, body_normal), (splash_depth, splash_normal)) =
             (needs.maps_or_other(true), needs.maps_or_other(false));
@@ -47,12 +62,14 @@ impl Refract {
             bound(2, body_normal, Access::FragmentRead),
             bound(3, splash_depth, Access::FragmentRead),
             bound(4, splash_normal, Access::FragmentRead),
-            bound(5, Id::Environment, Access::FragmentRead),
-            bound(6, Id::SceneColor, Access::FragmentRead),
-            bound(7, Id::SceneDepth, Access::FragmentRead),
-            bound(8, tiles, Access::FragmentRead),
+            bound(5, tiles, Access::FragmentRead),
+            bound(6, Id::Environment, Access::FragmentRead),
             used(Id::Output, Access::ColorAttachment),
         ];
+        if has_scene {
+            uses.push(bound(8, Id::SceneColor, Access::FragmentRead));
+            uses.push(bound(9, Id::SceneDepth, Access::FragmentRead));
+        }
         let mut colors = vec![(Id::Output, 0)];
         let mut formats = vec![self.output];
         if needs.debug {
@@ -62,23 +79,23 @@ impl Refract {
                 formats.push(vk::Format::R32G32B32A32_SFLOAT);
             }
         }
-        let has_scene = r.externals.scene_color.0 != r.externals.environment;
         let constants = [
             settings.refractions,
             settings.internal_reflections,
             u32::from(settings.fresnel == Fresnel::Exact),
             u32::from(splash),
             u32::from(body),
-            u32::from(has_scene),
             u32::from(takes_linear(self.output) == Some(false)),
+            u32::from(r.externals.background == Background::Host),
         ];
         let host = r.host;
-        let pipeline = self.pipelines.get((constants, needs.debug), |(constants, debug)| {
+        let variant = [needs.debug, has_scene, cube].map(usize::from);
+        let pipeline = self.pipelines.get((constants, variant), |(constants, [debug, scene, cube])| {
             Pipeline::graphics(
                 host,
                 &Graphics {
                     vertex: &REFRACT_VERT,
-                    fragment: if *debug { &shader::REFRACT_DEBUG_FRAG } else { &shader::REFRACT_FRAG },
+                    fragment: FRAGMENT[*debug][*scene][*cube],
                     constants,
                     topology: vk::PrimitiveTopology::TRIANGLE_LIST,
                     colors: &formats,

@@ -69,12 +69,7 @@ impl Renderer {
             self.retire(Resource::Buffer(old));
         }
         let bounds = particles.bounds().unwrap_or_default();
-        self.scene = SceneBounds {
-            space,
-            splash: particles.splash_count,
-            body: particles.body_count(),
-            bounds,
-        };
+        self.scene = SceneBounds { space, splash: particles.splash_count, body: particles.body_count(), bounds };
         Ok(())
     }
 

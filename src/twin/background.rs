@@ -1,8 +1,104 @@
-//! Twin of `glsl/include/background.glsl` without a host scene: the environment at infinity, b(direction) of eq. 6.
+//! Twin of `glsl/include/background.glsl`: b(direction) of eq. 6, the environment at infinity or the host's opaque scene.
 
-use crate::Equirect;
-use glam::{DVec3, Vec3};
+use super::search::{Maps, Ray};
+use crate::{
+    Equirect,
+    shader::{SCENE_BEHIND, STEEP},
+};
+use glam::{DVec3, Mat3, Vec3};
 use std::f64::consts::{PI, TAU};
+
+/// The host's opaque scene, row by row.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene<'a> {
+    /// Linear depth in particle radii; infinite where it was cleared.
+    pub depth: &'a [f64],
+    /// Linear colour.
+    pub color: &'a [Vec3],
+    /// Whether the host's own sky is seen where it was cleared ([`crate::Background::Host`]).
+    pub sky: bool,
+}
+
+impl Maps<'_> {
+    fn index(&self, pixel: [usize; 2]) -> usize {
+        pixel[1] * self.frame.viewport.x as usize + pixel[0]
+    }
+
+    /// Linear depth of the host's scene at a pixel; infinite without one.
+    pub fn scene_depth(&self, pixel: [usize; 2]) -> f64 {
+        self.scene.map_or(f64::INFINITY, |s| s.depth[self.index(pixel)])
+    }
+
+    /// Where a ray first meets the scene, in steps of an eighth of a pixel: it passes a pixel's depth, or comes into a pixel from before the
+    /// scene to hardly behind it. Further behind, an object stands between it and the eye.
+    pub fn meets_scene(&self, ray: &Ray) -> Option<(f64, [usize; 2])> {
+        self.scene?;
+        let slope = f64::from(STEEP / self.frame.to_pixel.x.abs());
+        let at = |t: f64| {
+            let x = ray.at(t);
+            let pixel = self.clamped(self.project(x));
+            (pixel, -x.z - self.scene_depth(pixel))
+        };
+        let (mut last, mut pixel, mut before) = (0.0, at(0.0).0, true);
+        loop {
+            let next = self.next_on_screen(ray, last);
+            let (now, behind) = at(next);
+            let first_here = last == 0.0 || now != pixel;
+            let limit = self.scene_depth(now) * f64::from(SCENE_BEHIND).max(slope);
+            // The step may have come into the pixel already behind what it was before on entering it.
+            let entered = if first_here { self.entering(ray, last, next, now) } else { last };
+            let on_entering = -ray.at(entered).z - self.scene_depth(now);
+            if first_here && before && on_entering > 0.0 && on_entering <= limit {
+                return Some((entered, now));
+            }
+            if on_entering <= 0.0 && behind >= 0.0 {
+                let (mut a, mut b) = (entered, next);
+                for _ in 0..60 {
+                    let t = 0.5 * (a + b);
+                    if -ray.at(t).z >= self.scene_depth(now) { b = t } else { a = t }
+                }
+                return Some((b, now));
+            }
+            if next >= ray.box_end || !self.in_view(ray.at(next)) {
+                return None;
+            }
+            (last, pixel, before) = (next, now, behind <= 0.0);
+        }
+    }
+
+    /// Where between two samples a ray comes into a pixel.
+    fn entering(&self, ray: &Ray, mut a: f64, mut b: f64, pixel: [usize; 2]) -> f64 {
+        if self.clamped(self.project(ray.at(a))) == pixel {
+            return a;
+        }
+        for _ in 0..60 {
+            let t = 0.5 * (a + b);
+            if self.clamped(self.project(ray.at(t))) == pixel { b = t } else { a = t }
+        }
+        b
+    }
+
+    /// Light of the scene at a pixel.
+    pub fn scene_light(&self, pixel: [usize; 2]) -> Vec3 {
+        self.scene.map_or(Vec3::ZERO, |s| s.color[self.index(pixel)])
+    }
+
+    /// What a ray from x brings back that meets no more liquid.
+    pub fn background(&self, environment: &Equirect, x: DVec3, dir: DVec3) -> Vec3 {
+        // Further than anything is, yet near enough that depths differ.
+        let ray = Ray::new(self.frame, x, dir).up_to(1e12);
+        if let Some((_, pixel)) = self.meets_scene(&ray) {
+            return self.scene_light(pixel);
+        }
+        if self.scene.is_some_and(|s| s.sky) && dir.z < 0.0 && self.in_view(dir * 1e12) {
+            let pixel = self.clamped(self.project(dir));
+            if self.scene_depth(pixel).is_infinite() {
+                return self.scene_light(pixel);
+            }
+        }
+        env_color(environment, Mat3::from_mat4(self.frame.eye_to_env).as_dmat3() * dir)
+    }
+}
 
 /// Light from a direction of the environment map's own space (+y up), bilinear; columns wrap around, rows end at the
 /// poles.

@@ -158,7 +158,8 @@ mod tests {
             let axes = Vec3::new(1.0, thin + 0.5 * (0.7 * t).sin().abs(), thin + 0.5 * (0.3 * t).cos().abs());
             let turn = Mat3::from_axis_angle(Vec3::new(t.sin(), t.cos(), 0.5).normalize(), 0.9 * t);
             let center = Vec3::new(1.3 * (1.1 * t).sin(), 1.1 * (2.3 * t).cos(), 0.9 * (1.7 * t).sin());
-            let q = Quadric::new(&frame, &space.pack(&Ellipsoid { center, axes: turn * Mat3::from_diagonal(0.3 * axes) }));
+            let q =
+                Quadric::new(&frame, &space.pack(&Ellipsoid { center, axes: turn * Mat3::from_diagonal(0.3 * axes) }));
             let hit = |x, y| {
                 let cast = q.cast(pixel_ray(&frame, x, y));
                 cast.depths[1] >= viewport(&frame).2

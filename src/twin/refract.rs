@@ -1,5 +1,5 @@
 //! Twin of `glsl/refract.frag`: the walk of one view ray through up to two volumes of liquid, and the light it brings
-//! back (Imai16 §4.4, §4.5, eqs. 6 to 9), total internal reflection followed inside. No host scene.
+//! back (Imai16 §4.4, §4.5, eqs. 6 to 9), total internal reflection followed inside, up to the host's scene.
 
 use super::{
     background::env_color,
@@ -10,7 +10,8 @@ use crate::{
     Equirect, Fresnel, Settings,
     shader::{
         CLASS_BODY, CLASS_SPLASH, OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_OTHER_WALL,
-        OUTCOME_REFLECTION_LIMIT, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH, SIDE_BACK, SIDE_FRONT,
+        OUTCOME_REFLECTION_LIMIT, OUTCOME_SCENE, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH, SIDE_BACK,
+        SIDE_FRONT, WETTED,
     },
 };
 use glam::{DVec3, Mat3, Vec3, Vec4Swizzles};
@@ -44,9 +45,8 @@ fn mirror(dir: DVec3, n: DVec3) -> DVec3 {
 /// frame's.
 pub fn walk(maps: &Maps, settings: &Settings, environment: &Equirect, pixel: [usize; 2]) -> Walk {
     let frame = maps.frame;
-    let to_env = Mat3::from_mat4(frame.eye_to_env).as_dmat3();
     let to_world = Mat3::from_mat4(frame.view).as_dmat3().transpose();
-    let background = |dir: DVec3| env_color(environment, to_env * dir);
+    let background = |x: DVec3, dir: DVec3| maps.background(environment, x, dir);
     let ior = frame.search.w;
     let exact = settings.fresnel == Fresnel::Exact;
     let [ax, ay, bx, by] = frame.to_pixel.to_array().map(f64::from);
@@ -71,15 +71,20 @@ pub fn walk(maps: &Maps, settings: &Settings, environment: &Equirect, pixel: [us
         None if body > 0.0 => Some((CLASS_BODY, body)),
         None => None,
     };
-    let Some((first, depth)) = start else {
+    let scene_depth = maps.scene_depth(pixel);
+    let Some((first, depth)) = start.filter(|(_, depth)| *depth <= scene_depth) else {
         let (pattern, outcome) = (PATTERN_NONE, OUTCOME_NO_LIQUID);
-        return Walk { pattern, outcome, hits: 0, length: 0.0, direction: to_world * dir, color: background(dir) };
+        let color = match scene_depth.is_finite() {
+            true => maps.scene_light(pixel),
+            false => env_color(environment, Mat3::from_mat4(frame.eye_to_env).as_dmat3() * dir),
+        };
+        return Walk { pattern, outcome, hits: 0, length: 0.0, direction: to_world * dir, color };
     };
 
     let (mut x, mut class, mut second) = (depth * v, first, None);
     let (mut color, mut light) = (Vec3::ZERO, Vec3::ONE);
     let (mut hits, mut length, mut bounces, mut other_wall) = (0, 0.0, 0, false);
-    let mut outcome = OUTCOME_HIT;
+    let (mut outcome, mut on_scene) = (OUTCOME_HIT, None);
     let volumes = if single { 1 } else { settings.refractions / 2 };
     'walk: for volume in 0..volumes {
         if volume > 0 || around.is_none() {
@@ -91,7 +96,7 @@ pub fn walk(maps: &Maps, settings: &Settings, environment: &Equirect, pixel: [us
             let n = if dir.dot(n) > 0.0 { -n } else { n };
             let bent = bend(dir, n, 1.0 / ior).expect("there is no critical angle into water");
             let share = fresnel(-dir.dot(n) as f32, -bent.dot(n) as f32, ior, exact);
-            color += light * share * background(mirror(dir, n));
+            color += light * share * background(x, mirror(dir, n));
             light *= 1.0 - share;
             dir = bent;
             hits += 1;
@@ -101,11 +106,27 @@ pub fn walk(maps: &Maps, settings: &Settings, environment: &Equirect, pixel: [us
         }
         let mut came_from = None;
         loop {
-            let exit = maps.find_exit(&Ray::new(frame, x, dir), class, came_from);
-            x += exit.t * dir;
-            length += exit.t;
+            let ray = Ray::new(frame, x, dir);
+            let exit = maps.find_exit(&ray, class, came_from);
+            let found = [OUTCOME_HIT, OUTCOME_OTHER_WALL].contains(&exit.outcome);
+            // Liquid that ends just before the scene touches it.
+            let gap = match found {
+                true => {
+                    let n = maps.sample_normal(class, exit.side, maps.project(ray.at(exit.t)));
+                    f64::from(WETTED) / dir.dot(n).abs().max(0.2)
+                }
+                false => 0.0,
+            };
+            let met = maps.meets_scene(&ray.up_to(exit.t + gap));
+            let t = met.map_or(exit.t, |(t, _)| t);
+            x += t * dir;
+            length += t;
             // Eq. (9), for this interval.
-            light *= (-frame.absorption.xyz() * exit.t as f32).exp();
+            light *= (-frame.absorption.xyz() * t as f32).exp();
+            if let Some((_, pixel)) = met {
+                on_scene = Some(pixel);
+                break 'walk;
+            }
             match exit.outcome {
                 OUTCOME_HIT => {}
                 OUTCOME_OTHER_WALL => other_wall = true,
@@ -121,7 +142,7 @@ pub fn walk(maps: &Maps, settings: &Settings, environment: &Equirect, pixel: [us
             if let Some(bent) = bend(dir, -n, ior) {
                 // Leave, eqs. (7) and (8).
                 let share = fresnel(bent.dot(n) as f32, dir.dot(n) as f32, ior, exact);
-                color += light * share * background(mirrored);
+                color += light * share * background(x, mirrored);
                 light *= 1.0 - share;
                 dir = bent;
                 break;
@@ -140,6 +161,10 @@ pub fn walk(maps: &Maps, settings: &Settings, environment: &Equirect, pixel: [us
         }
         match maps.find_entry(&Ray::new(frame, x, dir)) {
             Ok((met, t)) => {
+                if let Some((_, pixel)) = maps.meets_scene(&Ray::new(frame, x, dir).up_to(t)) {
+                    on_scene = Some(pixel);
+                    break;
+                }
                 x += t * dir;
                 class = met;
                 second = Some(met);
@@ -152,7 +177,10 @@ pub fn walk(maps: &Maps, settings: &Settings, environment: &Equirect, pixel: [us
             }
         }
     }
-    color += light * background(dir);
+    color += light * on_scene.map_or_else(|| background(x, dir), |pixel| maps.scene_light(pixel));
+    if on_scene.is_some() {
+        outcome = OUTCOME_SCENE;
+    }
     let pattern = second.map_or(PATTERN_SPLASH + first, |second| PATTERN_SPLASH_SPLASH + 2 * first + second);
     let outcome = if outcome == OUTCOME_HIT && other_wall { OUTCOME_OTHER_WALL } else { outcome };
     Walk { pattern, outcome, hits, length, direction: to_world * dir, color }

@@ -1,7 +1,7 @@
 //! Twin of `glsl/include/search.glsl`: walls along a ray x(t) = x0 + t w in the four maps (methods: "Walk of one view
 //! ray"). In place of the secant method, a dense march: slow, but the first wall is the first wall.
 
-use super::normal::decode_normal;
+use super::{background::Scene, normal::decode_normal};
 use crate::shader::{
     CLASS_BODY, CLASS_SPLASH, Frame, OUTCOME_HIT, OUTCOME_HOLE, OUTCOME_LEFT_VIEW, OUTCOME_OTHER_WALL, SIDE_BACK,
     SIDE_FRONT,
@@ -25,6 +25,8 @@ pub struct Maps<'a> {
     pub frame: &'a Frame,
     /// By class, then side.
     pub maps: [[Map<'a>; 2]; 2],
+    /// The host's, if there is one.
+    pub scene: Option<Scene<'a>>,
 }
 
 /// Samples of the march: pixels, and depth in particle radii, that one step may cover.
@@ -63,7 +65,7 @@ impl Maps<'_> {
     }
 
     /// The pixel that holds a position, clamped into the image.
-    fn clamped(&self, position: DVec2) -> [usize; 2] {
+    pub(super) fn clamped(&self, position: DVec2) -> [usize; 2] {
         let size = self.frame.viewport.xy().as_dvec2();
         let p = position.floor().clamp(DVec2::ZERO, size - 1.0);
         [p.x as usize, p.y as usize]
@@ -190,13 +192,17 @@ impl Maps<'_> {
 
     /// t of the next sample of the march.
     fn next(&self, ray: &Ray, t: f64) -> f64 {
+        let by_depth = STEP_DEPTH / ray.dir.z.abs().max(1e-12);
+        self.next_on_screen(ray, t).min(t + by_depth)
+    }
+
+    /// An eighth of a pixel on, or the ray's end.
+    pub(super) fn next_on_screen(&self, ray: &Ray, t: f64) -> f64 {
         let d = -ray.at(t).z;
         let lateral = ray.dir.truncate() * -ray.origin.z + ray.origin.truncate() * ray.dir.z;
         // |d pixel / dt| = |a lateral| / d²
         let speed = (lateral * self.frame.to_pixel.xy().as_dvec2()).length() / (d * d);
-        let by_pixels = STEP_PIXELS / speed.max(1e-12);
-        let by_depth = STEP_DEPTH / ray.dir.z.abs().max(1e-12);
-        ray.box_end.min(t + by_pixels.min(by_depth))
+        ray.box_end.min(t + STEP_PIXELS / speed.max(1e-12))
     }
 
     /// The next sample; `None` once the ray has left the view, the near plane or the box.
@@ -205,7 +211,7 @@ impl Maps<'_> {
         (t < ray.box_end && self.in_view(ray.at(next))).then_some(next)
     }
 
-    fn in_view(&self, x: DVec3) -> bool {
+    pub(super) fn in_view(&self, x: DVec3) -> bool {
         let size = self.frame.viewport.xy().as_dvec2();
         let p = self.project(x);
         -x.z >= f64::from(self.frame.viewport.z) && p.cmpge(DVec2::ZERO).all() && p.cmplt(size).all()
@@ -224,8 +230,8 @@ pub struct Ray {
     pub origin: DVec3,
     /// Unit direction.
     pub dir: DVec3,
-    /// t at which it leaves the liquid's box for good.
-    box_end: f64,
+    /// t at which it leaves the liquid's box for good, or is looked at no more.
+    pub(super) box_end: f64,
 }
 
 impl Ray {
@@ -237,6 +243,11 @@ impl Ray {
         let (low, high) = (frame.bounds_min.xyz().as_dvec3(), frame.bounds_max.xyz().as_dvec3());
         let ends = (0..3).filter(|k| w[*k] != 0.0).map(|k| (if w[k] > 0.0 { high[k] } else { low[k] } - o[k]) / w[k]);
         Ray { origin, dir, box_end: ends.fold(f64::INFINITY, f64::min).max(0.0) }
+    }
+
+    /// The same ray, for as long as it runs, box or no box.
+    pub fn up_to(self, end: f64) -> Ray {
+        Ray { box_end: end, ..self }
     }
 
     /// Point at t.

@@ -98,7 +98,7 @@ fn a_ball_is_left_as_the_closed_form_says() {
     let (center, radius) = (DVec3::new(0.1, -0.05, -1.2), 0.3);
     let frame = frame(&settings, (Vec3::new(-0.2, -0.35, -1.5), Vec3::new(0.4, 0.25, -0.9)));
     let layers = sphere_maps(&frame, center, radius);
-    let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]] };
+    let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]], scene: None };
     let mut compared = 0;
     for (i, found) in walk_all(&maps, &settings, &grey()).iter().enumerate() {
         let dir = view_ray(&frame, i).normalize();
@@ -128,7 +128,7 @@ fn absorption_follows_the_length_inside() {
     let (center, radius) = (DVec3::new(0.0, 0.0, -1.2), 0.3);
     let frame = frame(&settings, (Vec3::new(-0.3, -0.3, -1.5), Vec3::new(0.3, 0.3, -0.9)));
     let layers = sphere_maps(&frame, center, radius);
-    let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]] };
+    let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]], scene: None };
     let found = walk(&maps, &settings, &grey(), [SIZE[0] as usize / 2, SIZE[1] as usize / 2]);
     // Straight through the middle: 0.6 inside; what is reflected before was not absorbed.
     let f = ((IOR - 1.0) / (IOR + 1.0)).powi(2) as f32;
@@ -142,7 +142,7 @@ fn two_balls_in_a_row_bend_light_four_times() {
     let frame = frame(&settings, (Vec3::new(-0.5, -0.5, -3.0), Vec3::new(0.5, 0.5, -0.9)));
     let (near, far) = ((DVec3::new(0.05, 0.02, -1.15), 0.2), (DVec3::new(0.0, 0.0, -2.3), 0.5));
     let (body, splash) = (sphere_maps(&frame, near.0, near.1), sphere_maps(&frame, far.0, far.1));
-    let maps = Maps { frame: &frame, maps: [as_maps(&splash), as_maps(&body)] };
+    let maps = Maps { frame: &frame, maps: [as_maps(&splash), as_maps(&body)], scene: None };
     let mut compared = 0;
     for (i, found) in walk_all(&maps, &settings, &grey()).iter().enumerate() {
         let dir = view_ray(&frame, i).normalize();
@@ -169,7 +169,7 @@ fn an_eye_in_a_ball_meets_the_critical_angle() {
     let mut layers = sphere_maps(&frame, center, radius);
     // The front lies behind the near plane: as the ray cast writes it.
     layers[0].0.fill((-0.01 / RADIUS) as f32);
-    let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]] };
+    let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]], scene: None };
     let mut counts = [0, 0];
     for (i, found) in walk_all(&maps, &settings, &grey()).iter().enumerate() {
         let v = view_ray(&frame, i);

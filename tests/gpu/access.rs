@@ -40,17 +40,7 @@ fn a_frame_has_a_barrier_before_every_read() {
         let camera = camera(Vec3::new(0.3, 0.4, 2.0), Vec3::ZERO, size);
         // Three iterations: A is read both within the loop and after it.
         let settings = Settings { iterations: 3, ..Settings::default() };
-        let input = FrameInput {
-            slot: 0,
-            camera: &camera,
-            settings: &settings,
-            scene: None,
-            eye_inside: false,
-            output: vk::ImageView::null(),
-            debug: true,
-            positions: None,
-            neighbours: 0,
-        };
+        let input = FrameInput { debug: true, ..FrameInput::new(0, &camera, &settings, vk::ImageView::null()) };
         let mut plans = Vec::new();
         for _ in 0..4 {
             session.frame(&input).expect("frame");

@@ -43,17 +43,7 @@ fn with_renderer(driver: &Driver, format: vk::Format, frames: u32, body: impl Fn
 }
 
 fn input<'a>(case: &'a Case, slot: usize, output: vk::ImageView) -> FrameInput<'a> {
-    FrameInput {
-        slot,
-        camera: &case.camera,
-        settings: &case.settings,
-        scene: None,
-        eye_inside: false,
-        output,
-        debug: false,
-        positions: None,
-        neighbours: 0,
-    }
+    FrameInput::new(slot, &case.camera, &case.settings, output)
 }
 
 /// The picture in a canvas is the expected one. The debug variant that `shoot` draws with is another program, which may

@@ -33,7 +33,7 @@ impl OwnMaps {
 
     fn twin<'a>(&'a self, shot: &'a Shot) -> Maps<'a> {
         let maps = self.0.each_ref().map(|class| class.each_ref().map(|(depth, normal)| Map { depth, normal }));
-        Maps { frame: &shot.frame, maps }
+        Maps { frame: &shot.frame, maps, scene: None }
     }
 }
 

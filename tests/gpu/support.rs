@@ -110,15 +110,11 @@ impl Driver<'_> {
         let session = &mut *self.session.borrow_mut();
         session.resize(case.size).expect("size");
         let input = FrameInput {
-            slot: 0,
-            camera: &case.camera,
-            settings: &case.settings,
-            scene: None,
             eye_inside: case.eye_inside,
-            output: ash::vk::ImageView::null(),
             debug: true,
             positions,
             neighbours: 1022,
+            ..FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null())
         };
         session.frame(&input).expect("frame");
         let mut targets = HashMap::new();

@@ -238,15 +238,9 @@ fn measure(
     let (camera, eye) = camera::frame(&view, scene.origin, &scene.particles, aspect, 0.1 * scene.particles.radius)?;
     let upload = scene.give(args.prepare, session)?;
     let input = FrameInput {
-        slot: 0,
-        camera: &camera,
-        settings,
-        scene: None,
         eye_inside: scene.inside(eye),
-        output: ash::vk::ImageView::null(),
-        debug: false,
         positions: upload.as_ref().map(|u| scene.on_device(u)),
-        neighbours: 0,
+        ..FrameInput::new(0, &camera, settings, ash::vk::ImageView::null())
     };
     let bar = progress(u64::from(args.warmup + args.frames), "frames");
     let mut frames: Vec<FrameTimes> = Vec::new();

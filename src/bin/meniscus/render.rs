@@ -234,7 +234,9 @@ fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::er
             FresnelArg::Exact => Fresnel::Exact,
         },
         ior: args.ior,
-        absorption: args.absorption.map_or(Vec3::new(1.0, 0.35, 0.2) * (1.2 / (high - low).as_dvec3().length()) as f32, |a| a.as_vec3()),
+        absorption: args
+            .absorption
+            .map_or(Vec3::new(1.0, 0.35, 0.2) * (1.2 / (high - low).as_dvec3().length()) as f32, |a| a.as_vec3()),
         // The window covers the same part of the picture at any supersampling.
         window: (args.window - 1) * s + 1,
         iterations: args.iterations,
@@ -255,15 +257,10 @@ fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error
     let upload = job.scene.give(job.args.prepare, session)?;
     let (camera, settings) = (job.camera, job.settings);
     let mut input = FrameInput {
-        slot: 0,
-        camera: &camera,
-        settings: &settings,
-        scene: None,
         eye_inside: job.eye_inside,
-        output: ash::vk::ImageView::null(), // the session's canvas
-        debug: false,
         positions: upload.as_ref().map(|u| job.scene.on_device(u)),
-        neighbours: 0,
+        // The session has a canvas of its own.
+        ..FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null())
     };
     let mut times = session.frame(&input)?;
     if job.args.stats.is_some() {
