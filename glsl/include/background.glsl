@@ -69,7 +69,8 @@ bool meets_scene(Ray ray, out float t, out ivec2 pixel) {
         float d_at = 1.0 / mix(k0, k1, at), d_end = 1.0 / mix(k0, k1, end), surface = scene_linear(pixel);
         float behind = d_at - surface;
         bool between = before && behind > 0.0 && behind <= surface * max(SCENE_BEHIND, STEEP / abs(frame.to_pixel.x));
-        if (between || (behind <= 0.0 && surface <= d_end)) {
+        // At infinity rounding may leave nothing of 1 / d.
+        if (between || (behind <= 0.0 && surface <= d_end && surface < CLEARED)) {
             t = pixel_to_t(ray, between || k1 == k0 ? at : clamp((1.0 / surface - k0) / (k1 - k0), at, end));
             return true;
         }

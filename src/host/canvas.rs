@@ -12,6 +12,7 @@ pub struct Canvas<'a> {
     /// View for [`crate::FrameInput::output`].
     pub view: vk::ImageView,
     size: [u32; 2],
+    faces: u32,
     texel: u64,
     allocation: Option<Allocation>,
 }
@@ -19,19 +20,38 @@ pub struct Canvas<'a> {
 impl<'a> Canvas<'a> {
     /// A colour image with `texel` bytes a pixel.
     pub fn new(gpu: &'a Gpu<'a>, format: vk::Format, texel: u64, size: [u32; 2]) -> Result<Canvas<'a>, HostError> {
+        Self::with_faces(gpu, format, texel, size, 1)
+    }
+
+    /// A cube map with faces of so many pixels, in Vulkan's order of faces.
+    pub fn cube(gpu: &'a Gpu<'a>, format: vk::Format, texel: u64, edge: u32) -> Result<Canvas<'a>, HostError> {
+        Self::with_faces(gpu, format, texel, [edge, edge], 6)
+    }
+
+    fn with_faces(
+        gpu: &'a Gpu<'a>,
+        format: vk::Format,
+        texel: u64,
+        size: [u32; 2],
+        faces: u32,
+    ) -> Result<Canvas<'a>, HostError> {
         let spec = crate::resources::ImageSpec {
             format,
             size,
-            layers: 1,
+            layers: faces,
             array: false,
             usage: vk::ImageUsageFlags::COLOR_ATTACHMENT
                 | vk::ImageUsageFlags::TRANSFER_SRC
                 | vk::ImageUsageFlags::SAMPLED
                 | vk::ImageUsageFlags::TRANSFER_DST,
         };
+        let (flags, view_type) = match faces {
+            6 => (vk::ImageCreateFlags::CUBE_COMPATIBLE, vk::ImageViewType::CUBE),
+            _ => (vk::ImageCreateFlags::empty(), vk::ImageViewType::TYPE_2D),
+        };
         // SAFETY: complete info on a live device.
-        let image = unsafe { gpu.device.create_image(&spec.info(), None) }.map_err(vulkan("canvas"))?;
-        let mut canvas = Canvas { gpu, image, view: vk::ImageView::null(), size, texel, allocation: None };
+        let image = unsafe { gpu.device.create_image(&spec.info().flags(flags), None) }.map_err(vulkan("canvas"))?;
+        let mut canvas = Canvas { gpu, image, view: vk::ImageView::null(), size, faces, texel, allocation: None };
         // SAFETY: the image was just made; its memory is kept until it is destroyed.
         unsafe {
             let requirements = gpu.device.get_image_memory_requirements(image);
@@ -41,7 +61,7 @@ impl<'a> Canvas<'a> {
             bound.map_err(vulkan("canvas"))?;
             let info = vk::ImageViewCreateInfo::default()
                 .image(image)
-                .view_type(vk::ImageViewType::TYPE_2D)
+                .view_type(view_type)
                 .format(format)
                 .subresource_range(crate::access::whole(vk::ImageAspectFlags::COLOR));
             canvas.view = gpu.device.create_image_view(&info, None).map_err(vulkan("canvas"))?;
@@ -69,14 +89,31 @@ impl<'a> Canvas<'a> {
         unsafe { self.gpu.device.cmd_clear_color_image(cmd, self.image, layout, &value, &range) };
     }
 
+    /// Fills it with pixels, row by row, and leaves it in a layout.
+    pub fn write(&self, bytes: &[u8], layout: vk::ImageLayout) -> Result<(), HostError> {
+        let upload = super::Upload::new(self.gpu, bytes)?;
+        self.gpu.run(|cmd| {
+            let to = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+            self.transition(cmd, vk::ImageLayout::UNDEFINED, to);
+            // SAFETY: `cmd` is recording; the buffer holds the whole image (or the copy would be refused above).
+            unsafe { self.gpu.device.cmd_copy_buffer_to_image(cmd, upload.buffer, self.image, to, &[self.whole()]) };
+            self.transition(cmd, to, layout);
+            Ok(())
+        })
+    }
+
+    fn whole(&self) -> vk::BufferImageCopy {
+        let layers =
+            vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(self.faces);
+        let extent = vk::Extent3D { width: self.size[0], height: self.size[1], depth: 1 };
+        vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent)
+    }
+
     /// The pixels, row by row, after a frame that left them in `COLOR_ATTACHMENT_OPTIMAL`.
     pub fn read(&self) -> Result<Vec<u8>, HostError> {
         let bytes = u64::from(self.size[0]) * u64::from(self.size[1]) * self.texel;
         self.gpu.read_back(bytes, |cmd, buffer| {
             self.transition(cmd, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
-            let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
-            let extent = vk::Extent3D { width: self.size[0], height: self.size[1], depth: 1 };
-            let copy = vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent);
             // SAFETY: `cmd` is recording; the buffer holds the whole image.
             unsafe {
                 self.gpu.device.cmd_copy_image_to_buffer(
@@ -84,7 +121,7 @@ impl<'a> Canvas<'a> {
                     self.image,
                     vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
                     buffer,
-                    &[copy],
+                    &[self.whole()],
                 )
             };
             Ok(())

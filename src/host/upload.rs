@@ -7,7 +7,7 @@ use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 /// A storage buffer in memory that the host writes and the device reads.
 pub struct Upload<'a> {
     gpu: &'a Gpu<'a>,
-    /// Handle, with usage `STORAGE_BUFFER`.
+    /// Handle, with usage `STORAGE_BUFFER` and `TRANSFER_SRC`.
     pub buffer: vk::Buffer,
     allocation: Option<Allocation>,
 }
@@ -16,7 +16,9 @@ impl<'a> Upload<'a> {
     /// A buffer with this content, at least four bytes.
     pub fn new(gpu: &'a Gpu<'a>, bytes: &[u8]) -> Result<Upload<'a>, HostError> {
         let size = bytes.len().max(4) as u64;
-        let info = vk::BufferCreateInfo::default().size(size).usage(vk::BufferUsageFlags::STORAGE_BUFFER);
+        let info = vk::BufferCreateInfo::default()
+            .size(size)
+            .usage(vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_SRC);
         // SAFETY: complete info on a live device.
         let buffer = unsafe { gpu.device.create_buffer(&info, None) }.map_err(vulkan("upload"))?;
         let mut upload = Upload { gpu, buffer, allocation: None };

@@ -34,48 +34,32 @@ impl Maps<'_> {
     pub fn meets_scene(&self, ray: &Ray) -> Option<(f64, [usize; 2])> {
         self.scene?;
         let slope = f64::from(STEEP / self.frame.to_pixel.x.abs());
-        let at = |t: f64| {
-            let x = ray.at(t);
-            let pixel = self.clamped(self.project(x));
-            (pixel, -x.z - self.scene_depth(pixel))
-        };
-        let (mut last, mut pixel, mut before) = (0.0, at(0.0).0, true);
+        let pixel_at = |t: f64| self.clamped(self.project(ray.at(t)));
+        let behind = |t: f64, pixel| -ray.at(t).z - self.scene_depth(pixel);
+        // Whether it was in front of the scene before this pixel, and whether it just came into it.
+        let (mut before, mut entered) = (true, true);
+        let (mut last, mut pixel) = (0.0, pixel_at(0.0));
         loop {
-            let next = self.next_on_screen(ray, last);
-            let (now, behind) = at(next);
-            let first_here = last == 0.0 || now != pixel;
-            let limit = self.scene_depth(now) * f64::from(SCENE_BEHIND).max(slope);
-            // The step may have come into the pixel already behind what it was before on entering it.
-            let entered = if first_here { self.entering(ray, last, next, now) } else { last };
-            let on_entering = -ray.at(entered).z - self.scene_depth(now);
-            if first_here && before && on_entering > 0.0 && on_entering <= limit {
-                return Some((entered, now));
+            let on_entering = behind(last, pixel);
+            let limit = self.scene_depth(pixel) * f64::from(SCENE_BEHIND).max(slope);
+            if entered && before && on_entering > 0.0 && on_entering <= limit {
+                return Some((last, pixel));
             }
-            if on_entering <= 0.0 && behind >= 0.0 {
-                let (mut a, mut b) = (entered, next);
-                for _ in 0..60 {
-                    let t = 0.5 * (a + b);
-                    if -ray.at(t).z >= self.scene_depth(now) { b = t } else { a = t }
-                }
-                return Some((b, now));
+            let next = self.next_on_screen(ray, last);
+            let other = pixel_at(next);
+            // As far as the ray stays in this pixel, and where it comes into the next.
+            let (stays, comes) =
+                if other == pixel { (next, next) } else { bisect(last, next, |t| pixel_at(t) == other) };
+            if on_entering <= 0.0 && behind(stays, pixel) >= 0.0 {
+                return Some((bisect(last, stays, |t| behind(t, pixel) >= 0.0).1, pixel));
             }
             if next >= ray.box_end || !self.in_view(ray.at(next)) {
                 return None;
             }
-            (last, pixel, before) = (next, now, behind <= 0.0);
+            before = behind(stays, pixel) <= 0.0;
+            entered = other != pixel;
+            (last, pixel) = (comes, other);
         }
-    }
-
-    /// Where between two samples a ray comes into a pixel.
-    fn entering(&self, ray: &Ray, mut a: f64, mut b: f64, pixel: [usize; 2]) -> f64 {
-        if self.clamped(self.project(ray.at(a))) == pixel {
-            return a;
-        }
-        for _ in 0..60 {
-            let t = 0.5 * (a + b);
-            if self.clamped(self.project(ray.at(t))) == pixel { b = t } else { a = t }
-        }
-        b
     }
 
     /// Light of the scene at a pixel.
@@ -98,6 +82,15 @@ impl Maps<'_> {
         }
         env_color(environment, Mat3::from_mat4(self.frame.eye_to_env).as_dmat3() * dir)
     }
+}
+
+/// The two ends of the place, between a and b, where something becomes true.
+fn bisect(mut a: f64, mut b: f64, yet: impl Fn(f64) -> bool) -> (f64, f64) {
+    for _ in 0..60 {
+        let t = 0.5 * (a + b);
+        if yet(t) { b = t } else { a = t }
+    }
+    (a, b)
 }
 
 /// Light from a direction of the environment map's own space (+y up), bilinear; columns wrap around, rows end at the

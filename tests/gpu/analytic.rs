@@ -19,32 +19,32 @@ use meniscus::{
 const IOR: f64 = 1.333;
 
 /// (x - c)ᵀ M (x - c) = 1.
-struct Quadric {
+pub struct Quadric {
     c: DVec3,
     m: DMat3,
 }
 
 impl Quadric {
-    fn new(e: &Ellipsoid) -> Quadric {
+    pub fn new(e: &Ellipsoid) -> Quadric {
         let a = e.axes.as_dmat3();
         Quadric { c: e.center.as_dvec3(), m: (a * a.transpose()).inverse() }
     }
 
     /// Both crossings of a line.
-    fn crossings(&self, o: DVec3, w: DVec3) -> Option<(f64, f64)> {
+    pub fn crossings(&self, o: DVec3, w: DVec3) -> Option<(f64, f64)> {
         let q = o - self.c;
         let (a, b, c) = (w.dot(self.m * w), w.dot(self.m * q), q.dot(self.m * q) - 1.0);
         let root = b * b - a * c;
         (root > 0.0).then(|| ((-b - root.sqrt()) / a, (-b + root.sqrt()) / a))
     }
 
-    fn normal(&self, x: DVec3) -> DVec3 {
+    pub fn normal(&self, x: DVec3) -> DVec3 {
         (self.m * (x - self.c)).normalize()
     }
 }
 
 /// Snell's law; `n` against the ray. `None` beyond the critical angle.
-fn snell(w: DVec3, n: DVec3, eta: f64) -> Option<DVec3> {
+pub fn snell(w: DVec3, n: DVec3, eta: f64) -> Option<DVec3> {
     let along = w - w.dot(n) * n; // the part along the surface grows by eta
     let sine = eta * along.length();
     (sine <= 1.0).then(|| eta * along - (1.0 - sine * sine).sqrt() * n)
@@ -94,35 +94,35 @@ fn through(q: &Quadric, o: DVec3, w: DVec3, limit: u32) -> Option<(Passage, f64)
     Some((inside(q, o, at, bent, limit), -w.dot(n)))
 }
 
-const SIZE: [u32; 2] = [320, 240];
+pub const SIZE: [u32; 2] = [320, 240];
 
-fn view(eye: Vec3, target: Vec3, fov_degrees: f32) -> Camera {
+pub fn view(eye: Vec3, target: Vec3, fov_degrees: f32) -> Camera {
     Camera::look_at(eye, target, Vec3::Y, fov_degrees.to_radians(), SIZE[0] as f32 / SIZE[1] as f32, 0.01)
 }
 
-fn case(radius: f32, splash: &[Ellipsoid], body: &[Ellipsoid], camera: Camera, settings: Settings) -> Case {
+pub fn case(radius: f32, splash: &[Ellipsoid], body: &[Ellipsoid], camera: Camera, settings: Settings) -> Case {
     let particles = Particles { radius, ellipsoids: [splash, body].concat(), splash_count: splash.len() };
     Case { particles, camera, settings, size: SIZE, eye_inside: false }
 }
 
-fn settings(refractions: u32, internal_reflections: u32) -> Settings {
+pub fn settings(refractions: u32, internal_reflections: u32) -> Settings {
     Settings { refractions, internal_reflections, iterations: 0, ..Settings::default() }
 }
 
 /// One pixel: where its ray starts and runs in the world (from the camera's matrices alone), and what the GPU found.
-struct Pixel {
-    index: usize,
-    eye: DVec3,
-    dir: DVec3,
+pub struct Pixel {
+    pub index: usize,
+    pub eye: DVec3,
+    pub dir: DVec3,
     /// Cosine between the ray and the view axis: depth per length.
-    slant: f64,
-    pattern: u32,
-    outcome: u32,
-    length: f64,
-    found: DVec3,
+    pub slant: f64,
+    pub pattern: u32,
+    pub outcome: u32,
+    pub length: f64,
+    pub found: DVec3,
 }
 
-fn pixels(case: &Case, shot: &Shot) -> Vec<Pixel> {
+pub fn pixels(case: &Case, shot: &Shot) -> Vec<Pixel> {
     let (walk, direction) = (shot.floats(Id::Walk, 0).unwrap(), shot.floats(Id::Direction, 0).unwrap());
     let numbers = walk.iter().chain(&direction).chain(shot.picture.as_flattened());
     assert!(numbers.into_iter().all(|v| v.is_finite()), "not finite");
@@ -149,7 +149,7 @@ fn pixels(case: &Case, shot: &Shot) -> Vec<Pixel> {
 
 /// That many errors, of which 99 % and all stay within their limits.
 #[track_caller]
-fn within(what: &str, driver: &Driver, mut errors: Vec<f64>, at_least: usize, most: f64, all: f64) {
+pub fn within(what: &str, driver: &Driver, mut errors: Vec<f64>, at_least: usize, most: f64, all: f64) {
     errors.sort_by(f64::total_cmp);
     assert!(errors.len() >= at_least, "{what}: only {} pixels to compare", errors.len());
     let (p99, max) = (errors[(errors.len() - 1) * 99 / 100], errors[errors.len() - 1]);

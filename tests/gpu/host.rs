@@ -11,9 +11,9 @@ use meniscus::{
     twin::optics::srgb_byte,
 };
 
-const SIZE: [u32; 2] = [96, 72];
+pub const SIZE: [u32; 2] = [96, 72];
 
-fn case(particles: Particles) -> Case {
+pub fn case(particles: Particles) -> Case {
     let eye = Vec3::new(0.0, 0.0, 3.0);
     Case {
         particles,
@@ -24,12 +24,12 @@ fn case(particles: Particles) -> Case {
     }
 }
 
-fn ball() -> Particles {
+pub fn ball() -> Particles {
     Particles { radius: 0.5, ellipsoids: vec![sphere(Vec3::ZERO, 0.5)], splash_count: 1 }
 }
 
 /// A renderer on a device of its own, given to `body`, then destroyed.
-fn with_renderer(driver: &Driver, format: vk::Format, frames: u32, body: impl FnOnce(&Gpu, &mut Renderer)) {
+pub fn with_renderer(driver: &Driver, format: vk::Format, frames: u32, body: impl FnOnce(&Gpu, &mut Renderer)) {
     let device = driver.instance.pick(Some(&driver.name)).expect("it was there a moment ago");
     let gpu = Gpu::new(driver.instance, device).expect("device");
     // SAFETY: the device outlives the renderer and has the required features.
@@ -42,7 +42,7 @@ fn with_renderer(driver: &Driver, format: vk::Format, frames: u32, body: impl Fn
     unsafe { renderer.destroy() };
 }
 
-fn input<'a>(case: &'a Case, slot: usize, output: vk::ImageView) -> FrameInput<'a> {
+pub fn input<'a>(case: &'a Case, slot: usize, output: vk::ImageView) -> FrameInput<'a> {
     FrameInput::new(slot, &case.camera, &case.settings, output)
 }
 

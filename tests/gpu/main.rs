@@ -2,6 +2,7 @@
 
 mod access;
 mod analytic;
+mod background;
 mod compact;
 mod cull;
 mod extent;

@@ -1,12 +1,16 @@
 //! The refraction pass against its twin, which walks in the GPU's own four maps.
 
-use crate::support::{Case, Driver, Shot, camera, each_driver, random_cloud};
+use crate::{
+    background::{HostScene, Painted},
+    support::{Case, Driver, Shot, camera, each_driver, random_cloud},
+};
 use glam::{DVec3, Vec3};
 use meniscus::{
-    Equirect, Fresnel, Particles, Settings,
-    shader::{OUTCOME_HIT, PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH_SPLASH},
+    Background, Equirect, Fresnel, Particles, Settings,
+    shader::{OUTCOME_HIT, OUTCOME_SCENE, PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH_SPLASH},
     targets::{Id, Needs},
     twin::{
+        background::Scene,
         refract::{Walk, walk},
         search::{Map, Maps},
     },
@@ -63,13 +67,12 @@ struct Pair {
 }
 
 /// Every pixel of a frame, or every fourth: the twin's march is slow.
-fn pairs(driver: &Driver, case: &Case, sky: &Equirect) -> Vec<Pair> {
-    let shot = driver.shoot(case);
+fn pairs(driver: &Driver, case: &Case, shot: &Shot, scene: Option<Scene>, sky: &Equirect) -> Vec<Pair> {
     let (walks, directions) = (shot.floats(Id::Walk, 0).unwrap(), shot.floats(Id::Direction, 0).unwrap());
     let numbers = walks.iter().chain(&directions).chain(shot.picture.as_flattened());
     assert!(numbers.into_iter().all(|v| v.is_finite()), "{}: not finite", driver.name);
-    let own = OwnMaps::of(case, &shot);
-    let maps = own.twin(&shot);
+    let own = OwnMaps::of(case, shot);
+    let maps = Maps { scene, ..own.twin(shot) };
     let width = case.size[0] as usize;
     let chosen = |i: &usize| case.settings.refractions == 1 || (i % width + i / width * 2).is_multiple_of(4);
     let pixels: Vec<usize> = (0..walks.len() / 4).filter(chosen).collect();
@@ -102,7 +105,7 @@ fn at_least(what: &str, driver: &Driver, pairs: &[&Pair], share: f64, good: impl
 fn compare(driver: &Driver, case: &Case, sky: &Equirect) {
     let s = &case.settings;
     println!("  refractions {}, reflections {}, {:?}:", s.refractions, s.internal_reflections, s.fresnel);
-    let pairs = pairs(driver, case, sky);
+    let pairs = pairs(driver, case, &driver.shoot(case), None, sky);
     for pair in &pairs {
         let (gpu, twin) = (first_volume(pair.pattern), first_volume(pair.twin.pattern));
         assert_eq!(gpu, twin, "{}: first volume of pixel {}", driver.name, pair.index);
@@ -132,6 +135,36 @@ fn compare(driver: &Driver, case: &Case, sky: &Equirect) {
     at_least("pattern", driver, &hit, 0.985, |p| p.pattern == p.twin.pattern);
     let agree: Vec<_> = hit.into_iter().filter(|p| p.angle <= 0.2).collect();
     at_least("colour", driver, &agree, 0.99, |p| same_color(p, 0.01));
+}
+
+/// Before a scene of the host's: where it is met, and what is seen there.
+pub fn compare_before(driver: &Driver, case: &Case, painted: &Painted, background: Background) {
+    let images = HostScene::new(driver.gpu(), &case.camera, case.size, painted);
+    let shot = driver.shoot_before(case, images.input(), background);
+    let depth: Vec<f64> = painted.0.iter().map(|d| d / shot.space.radius).collect();
+    let scene = Scene { depth: &depth, color: &painted.1, sky: background == Background::Host };
+    let pairs = pairs(driver, case, &shot, Some(scene), &Equirect::procedural_sky());
+    let (liquid, other): (Vec<_>, Vec<_>) = pairs.iter().partition(|p| p.pattern != PATTERN_NONE);
+    println!("  {background:?}, refractions {}: {} pixels of liquid", case.settings.refractions, liquid.len());
+    assert!(liquid.len() > 500, "{}: only {} pixels of liquid", driver.name, liquid.len());
+    at_least("first volume", driver, &liquid, 0.999, |p| first_volume(p.pattern) == first_volume(p.twin.pattern));
+    at_least("no liquid", driver, &other, 0.999, |p| p.twin.pattern == PATTERN_NONE);
+    if background == Background::Environment {
+        at_least("straight through", driver, &other, 0.999, |p| same_color(p, 0.01));
+    }
+    if case.settings.refractions > 1 {
+        let met: Vec<_> = liquid.iter().copied().filter(|p| p.outcome == OUTCOME_SCENE).collect();
+        assert!(met.len() > 300, "{}: only {} pixels meet the scene", driver.name, met.len());
+        at_least("the scene is met", driver, &met, 0.97, |p| p.twin.outcome == OUTCOME_SCENE);
+        let both: Vec<_> = met.into_iter().filter(|p| p.twin.outcome == OUTCOME_SCENE && p.angle <= 0.2).collect();
+        at_least("direction", driver, &both, 0.99, |p| p.angle <= 0.2);
+        at_least("length within 1 %", driver, &both, 0.98, |p| {
+            (p.length - p.twin.length).abs() <= 0.01 * p.twin.length
+        });
+    }
+    // A ray half a hundredth of a degree off may meet the next block.
+    let agree: Vec<_> = liquid.into_iter().filter(|p| p.angle <= 0.05 && p.outcome == p.twin.outcome).collect();
+    at_least("colour", driver, &agree, 0.97, |p| same_color(p, 0.02));
 }
 
 fn optics(refractions: u32, internal_reflections: u32, fresnel: Fresnel, absorption: Vec3) -> Settings {

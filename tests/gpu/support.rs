@@ -2,7 +2,7 @@
 
 use glam::{Mat3, Vec3};
 use meniscus::{
-    Camera, Ellipsoid, Equirect, FrameInput, Particles, Settings,
+    Background, Camera, Ellipsoid, Equirect, FrameInput, Particles, SceneInput, Settings,
     host::{Gpu, Instance, Session, Upload},
     prepare::{self, DevicePositions},
     shader::Frame,
@@ -77,7 +77,7 @@ pub struct Driver<'a> {
     pub name: String,
 }
 
-impl Driver<'_> {
+impl<'a> Driver<'a> {
     /// Renders a case (with `debug` targets) and reads everything back.
     pub fn shoot(&self, case: &Case) -> Shot {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
@@ -106,17 +106,36 @@ impl Driver<'_> {
         self.shoot_frame(case, Some(positions))
     }
 
+    /// The same before a scene of the host's.
+    pub fn shoot_before(&self, case: &Case, scene: SceneInput, background: Background) -> Shot {
+        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        let mut shot = self.shoot_input(case, &|input| FrameInput { scene: Some(scene), background, ..input });
+        let p = case.camera.projection;
+        shot.frame.scene.x = p.z_axis.z;
+        shot.frame.scene.y = p.w_axis.z / shot.space.radius as f32;
+        shot.frame.scene.z = scene.cleared_depth;
+        shot
+    }
+
+    /// The device that frames are rendered on.
+    pub fn gpu(&self) -> &'a Gpu<'a> {
+        self.session.borrow().gpu
+    }
+
     fn shoot_frame(&self, case: &Case, positions: Option<DevicePositions>) -> Shot {
+        self.shoot_input(case, &|input| FrameInput { positions, ..input })
+    }
+
+    fn shoot_input(&self, case: &Case, change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>) -> Shot {
         let session = &mut *self.session.borrow_mut();
         session.resize(case.size).expect("size");
         let input = FrameInput {
             eye_inside: case.eye_inside,
             debug: true,
-            positions,
             neighbours: 1022,
             ..FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null())
         };
-        session.frame(&input).expect("frame");
+        session.frame(&change(input)).expect("frame");
         let mut targets = HashMap::new();
         for id in Id::OWN.into_iter().filter(|id| *id != Id::SplatDepth) {
             for layer in 0..2 {
