@@ -19,7 +19,7 @@ void main() {
     if (i >= frame.particles.x) return;
     Particle p;
     int cls;
-    if (!particle(i, p, cls)) {
+    if (!particle(i, p, cls) || repeats(i)) {
         visible.at[i] = 0u;
         return;
     }

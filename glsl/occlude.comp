@@ -18,7 +18,7 @@ void main() {
     uint i = invocation();
     Particle p;
     int cls;
-    if (i >= frame.particles.x || !particle(i, p, cls) || cls != CLASS_BODY) return;
+    if (i >= frame.particles.x || !particle(i, p, cls) || cls != CLASS_BODY || repeats(i)) return;
     Ellipsoid e = to_eye(p);
     float near = -e.center.z - sqrt(e.sd.z), far = -e.center.z + sqrt(e.sd.z);
     if (near <= frame.viewport.z) return;

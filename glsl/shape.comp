@@ -38,8 +38,6 @@ void list(uint k, uint number) {
     neighbours.at[k * share()] = input_index(k);
     neighbours.at[k * share() + 1u] = number;
 }
-#else
-void list(uint k, uint number) {}
 #endif
 
 ivec3 place_cell(uint place) {
@@ -93,6 +91,12 @@ uvec2 run_of(ivec3 from, ivec3 to, uint low) {
     uint begin = search_key(sort_key(from).x, low), key = sort_key(to).x;
     // The last key of all has none after it.
     return uvec2(begin, key == 0xffffffffu ? count() : search_key(key + 1u, begin));
+}
+
+// In a crowd, every how many of its candidates one stands for all.
+uint step_of(uvec2 run) {
+    const uint most = RELATION ? CROWD_RELATION : CROWD;
+    return max((run.y - run.x + most - 1u) / most, 1u);
 }
 
 // Whether b - a is shorter than the reach: ties of float32 decided to 2^-45 of the square.
@@ -150,12 +154,12 @@ struct Sums {
     Vectors mixed_part;
 };
 
-// Adds what is near; a choice of numbers costs less than a branch that neighbouring invocations take differently.
-void add(inout Sums s, bvec4 near, Vectors o, vec4 squared) {
+// Adds what is near, `many` times; a choice of numbers costs less than a branch that neighbouring invocations take differently.
+void add(inout Sums s, bvec4 near, uint many, Vectors o, vec4 squared) {
     vec4 d = sqrt(mix(vec4(prepare.lengths.w * prepare.lengths.w), squared, near));
-    vec4 q = d * (1.0 / prepare.lengths.w), w = mix(vec4(0.0), 1.0 - q * q * q, near);
-    s.number += uvec4(near);
-    s.density += spline(d * (1.0 / prepare.lengths.z));
+    vec4 q = d * (1.0 / prepare.lengths.w), w = float(many) * mix(vec4(0.0), 1.0 - q * q * q, near);
+    s.number += many * uvec4(near);
+    s.density += float(many) * spline(d * (1.0 / prepare.lengths.z));
     s.weight += w;
     vec4 x = w * o.x, y = w * o.y, z = w * o.z;
     s.first.x += x;
@@ -234,7 +238,9 @@ void main() {
         vec3 x = sorted_position(from);
         if (!finite(x)) {
             write(from, vec3(0.0), vec3(0.0), vec3(0.0));
+#ifdef NEIGHBOURS
             list(from, 0u);
+#endif
             continue;
         }
         // Those that follow in the same cell or the next: their candidates are nearly the same. Components without a particle
@@ -272,12 +278,17 @@ void main() {
         Sums s = Sums(uvec4(0u), vec4(0.0), vec4(0.0), none, none, none);
         // One loop over all runs: invocations whose runs differ in length stay together.
         float limit = prepare.lengths.w * prepare.lengths.w;
-        uint run = 0u, j = runs[0].x, end = runs[0].y;
+        uint run = 0u, j = runs[0].x, end = runs[0].y, step = step_of(runs[0]);
+#ifdef NEIGHBOURS
+        uint listed[SHAPE_RUN];
+        for (uint b = 0u; b < SHAPE_RUN; ++b) listed[b] = 0u;
+#endif
         while (true) {
-            if (j == end) {
+            if (j >= end) {
                 if (++run == number) break;
                 j = runs[run].x;
                 end = runs[run].y;
+                step = step_of(runs[run]);
             }
             uint other = RELATION ? order_at(j) / 27u : j;
             vec3 y = sorted_position(other);
@@ -290,17 +301,24 @@ void main() {
                 }
             }
 #ifdef NEIGHBOURS
+            // All are listed; those that the sums leave out count nothing.
             for (uint b = 0u; from + b < next; ++b) {
-                uint place = 2u + s.number[b];
-                if (near[b] && place < share()) neighbours.at[(from + b) * share() + place] = input_index(other);
+                if (!near[b]) continue;
+                uint place = 2u + listed[b]++;
+                if (place < share()) neighbours.at[(from + b) * share() + place] = input_index(other);
             }
-#endif
-            add(s, near, o, squared);
+            add(s, near, (j - runs[run].x) % step == 0u ? min(step, end - j) : 0u, o, squared);
             ++j;
+#else
+            add(s, near, min(step, end - j), o, squared);
+            j += step;
+#endif
         }
         for (uint b = 0u; b < SHAPE_RUN; ++b) {
             if (from + b == next) break;
-            list(from + b, s.number[b]);
+#ifdef NEIGHBOURS
+            list(from + b, listed[b]);
+#endif
             finish(from + b, of(p, b), s, b);
         }
     }

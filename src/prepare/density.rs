@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::neighbours::{Grid, Search, distance_squared};
+use super::neighbours::{Grid, Neighbour, Search, distance_squared};
 use super::options::{Options, Scale};
 use super::{PrepareError, check_lengths, check_positions};
 use crate::particles::Class;
@@ -36,9 +36,9 @@ pub fn rest_density(support: f64) -> f64 {
 pub(super) fn relative_densities(grid: &Grid, scale: Scale, search: Search) -> Vec<f64> {
     let rest = rest_density(scale.support / scale.radius);
     grid.map_neighbours(scale.support, search, |i, near| {
-        let weight = |&j: &u32| {
-            let squared = distance_squared(grid.positions[i], grid.positions[j as usize]);
-            spline(squared.sqrt() / scale.support)
+        let weight = |j: &Neighbour| {
+            let squared = distance_squared(grid.positions[i], grid.positions[j.index as usize]);
+            f64::from(j.count) * spline(squared.sqrt() / scale.support)
         };
         near.iter().map(weight).sum::<f64>() / rest
     })
@@ -95,7 +95,7 @@ impl DensityField {
     /// ρ/ρ0 at `point`: about 1 inside the liquid at rest, ½ on a flat surface (one radius above
     /// the outermost centres), 0 far away or where `point` is not finite.
     pub fn relative_density(&self, point: Vec3) -> f32 {
-        let weight = |squared: f64| spline(squared.sqrt() / self.support);
+        let weight = |(squared, count): (f64, u32)| f64::from(count) * spline(squared.sqrt() / self.support);
         let sum: f64 = self.grid.around(point, self.support).map(weight).sum();
         (sum / self.rest) as f32
     }

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::density::lattice;
-use super::neighbours::Grid;
+use super::neighbours::{Grid, Neighbour};
 use super::options::{Options, Scale};
 use crate::{particles::Ellipsoid, shader::DEGENERATE_SHARE};
 
@@ -59,20 +59,21 @@ impl<'a> Fitter<'a> {
     /// As in the paper, liquid shrinks: with the defaults the outermost centres of a flat surface
     /// sink by 1.85 r, the next layer by 0.94 r, and a lone block of 27 particles from 6 r to
     /// 1.25 r across. A smaller support or λ takes less.
-    pub fn fit(&self, i: usize, near: &[u32]) -> (Ellipsoid, Shape) {
+    pub fn fit(&self, i: usize, near: &[Neighbour]) -> (Ellipsoid, Shape) {
         let (center, radius) = (self.grid.positions[i], self.scale.radius);
         let sphere = super::sphere(center, radius as f32);
-        if near.len() <= self.options.min_neighbours + 1 {
+        if near.iter().map(|j| j.count as usize).sum::<usize>() <= self.options.min_neighbours + 1 {
             return (sphere, Shape::FewNeighbours);
         }
 
         // Offsets from the particle itself, so that nothing is lost far from the origin.
         let origin = center.as_dvec3();
         let (mut sum, mut mean, mut covariance) = (0.0, DVec3::ZERO, DMat3::ZERO);
-        for &j in near {
-            let offset = self.grid.positions[j as usize].as_dvec3() - origin;
-            let weighted = offset * weight(offset.length(), self.scale.reach());
-            sum += weight(offset.length(), self.scale.reach());
+        for j in near {
+            let offset = self.grid.positions[j.index as usize].as_dvec3() - origin;
+            let weight = f64::from(j.count) * weight(offset.length(), self.scale.reach());
+            let weighted = offset * weight;
+            sum += weight;
             mean += weighted;
             covariance += outer(offset, weighted);
         }

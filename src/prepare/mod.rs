@@ -31,8 +31,7 @@ use options::Scale;
 pub struct Input<'a> {
     /// Centres.
     pub positions: &'a [Vec3],
-    /// Particle radius: half the rest spacing. One far too large makes everything everybody's
-    /// neighbour, and the time quadratic.
+    /// Particle radius: half the rest spacing.
     pub radius: f32,
     /// Classes to use instead of the threshold's.
     pub classes: Option<&'a [Class]>,

@@ -7,6 +7,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::PrepareError;
+use crate::shader::{CROWD, CROWD_RELATION};
 
 /// Whole cell coordinates. They are compared in full, so two cells never alias.
 pub type Cell = [i32; 3];
@@ -24,6 +25,23 @@ pub enum Search {
     Runs,
     /// Im16 §III: sort 27 `n` (cell, particle) entries, so that one run holds all candidates.
     Relation,
+}
+
+/// A neighbour, or in a crowd one of several that it stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Neighbour {
+    /// Its place in the grid's order.
+    pub index: u32,
+    /// How many particles it stands for, itself included.
+    pub count: u32,
+}
+
+/// A run of candidates; of one longer than `most`, evenly chosen ones that stand for the others. Without that, particles
+/// on one spot would each look at all the others there.
+fn thinned(run: Range<u32>, most: u32) -> impl Iterator<Item = Neighbour> {
+    let step = (run.end - run.start).div_ceil(most).max(1);
+    let end = run.end;
+    run.step_by(step as usize).map(move |index| Neighbour { index, count: step.min(end - index) })
 }
 
 /// `floor(point / size)` on each axis; `None` where that lies beyond 2^28 cells.
@@ -100,35 +118,37 @@ impl Grid {
     }
 
     /// Candidates for particles within `radius` of any point in `cell` (of this grid's size).
-    fn candidates(&self, cell: Cell, radius: f64) -> impl Iterator<Item = u32> {
-        self.runs(cell, (radius / self.size).ceil() as i32).flatten()
+    fn candidates(&self, cell: Cell, radius: f64) -> impl Iterator<Item = Neighbour> {
+        self.runs(cell, (radius / self.size).ceil() as i32).flat_map(|run| thinned(run, CROWD))
     }
 
-    /// Squared distance of every particle nearer to `point` than `radius`, in canonical order.
-    pub fn around(&self, point: Vec3, radius: f64) -> impl Iterator<Item = f64> {
+    /// Squared distance of every particle nearer to `point` than `radius`, in canonical order, and how many it stands for.
+    pub fn around(&self, point: Vec3, radius: f64) -> impl Iterator<Item = (f64, u32)> {
         let cell = cell_of(point, self.size);
         cell.into_iter()
             .flat_map(move |cell| self.candidates(cell, radius))
-            .map(move |j| distance_squared(point, self.positions[j as usize]))
-            .filter(move |&squared| squared < radius * radius)
+            .map(move |j| (distance_squared(point, self.positions[j.index as usize]), j.count))
+            .filter(move |(squared, _)| *squared < radius * radius)
     }
 
     /// Calls `f(i, neighbours)` for every particle, in parallel, and returns the answers in order.
-    /// Neighbours are strictly nearer than `radius`, ascend, and include `i` itself.
+    /// Neighbours are strictly nearer than `radius`, ascend, and include `i` itself. They are all of them where no run of
+    /// cells that differ in z alone holds more than [`CROWD`] particles (in the relation table, where no 27 cells hold more
+    /// than [`CROWD_RELATION`]): twenty-five times what liquid at rest has there.
     pub fn map_neighbours<T: Send>(
         &self,
         radius: f64,
         search: Search,
-        f: impl Fn(usize, &[u32]) -> T + Sync,
+        f: impl Fn(usize, &[Neighbour]) -> T + Sync,
     ) -> Vec<T> {
         match search {
             Search::Runs => {
-                let gather = |cell, out: &mut Vec<u32>| out.extend(self.candidates(cell, radius));
+                let gather = |cell, out: &mut Vec<Neighbour>| out.extend(self.candidates(cell, radius));
                 self.map_candidates(radius, self.size, gather, f)
             }
             Search::Relation => {
                 let table = Relation::new(&self.positions, radius);
-                let gather = |cell, out: &mut Vec<u32>| out.extend(table.candidates(cell));
+                let gather = |cell, out: &mut Vec<Neighbour>| out.extend(table.candidates(cell));
                 self.map_candidates(radius, radius, gather, f)
             }
         }
@@ -140,18 +160,18 @@ impl Grid {
         &self,
         radius: f64,
         size: f64,
-        gather: impl Fn(Cell, &mut Vec<u32>) + Sync,
-        f: impl Fn(usize, &[u32]) -> T + Sync,
+        gather: impl Fn(Cell, &mut Vec<Neighbour>) + Sync,
+        f: impl Fn(usize, &[Neighbour]) -> T + Sync,
     ) -> Vec<T> {
         let state = || (None, Vec::new(), Vec::new());
-        let each = |(last, candidates, near): &mut (_, Vec<u32>, Vec<u32>), (i, &at): (usize, _)| {
+        let each = |(last, candidates, near): &mut (_, Vec<Neighbour>, Vec<Neighbour>), (i, &at): (usize, _)| {
             let cell = cell_of(at, size);
             if cell != *last {
                 *last = cell;
                 candidates.clear();
                 cell.into_iter().for_each(|cell| gather(cell, candidates));
             }
-            let inside = |&&j: &&u32| distance_squared(at, self.positions[j as usize]) < radius * radius;
+            let inside = |j: &&Neighbour| distance_squared(at, self.positions[j.index as usize]) < radius * radius;
             near.clear();
             near.extend(candidates.iter().filter(inside));
             f(i, near)
@@ -177,9 +197,10 @@ impl Relation {
         Self(entries)
     }
 
-    fn candidates(&self, cell: Cell) -> impl Iterator<Item = u32> {
+    fn candidates(&self, cell: Cell) -> impl Iterator<Item = Neighbour> {
         let first = self.0.partition_point(|entry| entry.0 < cell);
-        let run = self.0[first..].iter().take_while(move |entry| entry.0 == cell);
-        run.map(|entry| entry.1)
+        let last = first + self.0[first..].partition_point(|entry| entry.0 == cell);
+        let run = thinned(first as u32..last as u32, CROWD_RELATION);
+        run.map(|entry| Neighbour { index: self.0[entry.index as usize].1, ..entry })
     }
 }

@@ -22,7 +22,12 @@ pub fn cull(frame: &Frame, particles: &[Particle], bounds: Option<&[u32]>, sides
     let wanted = if sides == 2 { VISIBLE_FRONT | VISIBLE_BACK } else { VISIBLE_FRONT };
     let mut culled = Culled { verdicts: Vec::with_capacity(particles.len()), counts: [0, 0], largest_point: 0.0 };
     let rounding = f64::from(DEPTH_ROUNDING);
-    for particle in particles {
+    for (i, particle) in particles.iter().enumerate() {
+        // On one spot one is enough.
+        if i > 0 && particles[i - 1] == *particle {
+            culled.verdicts.push(0);
+            continue;
+        }
         let q = Quadric::new(frame, particle);
         let rectangle = q.rectangle(frame, PAD);
         let mut verdict = 0;

@@ -13,7 +13,8 @@ fn assert_neighbours(name: &str, cloud: &[Vec3], size: f64) {
     assert!(indices.into_iter().eq(0..cloud.len() as u32), "{name}: order is a permutation");
     let mut found = 0;
     for radius in [size, 1.5 * size, 2.0 * size] {
-        let lists = SEARCHES.map(|s| grid.map_neighbours(radius, s, |_, near| near.to_vec()));
+        let lists = SEARCHES
+            .map(|s| grid.map_neighbours(radius, s, |_, near| near.iter().map(|j| j.index).collect::<Vec<_>>()));
         for (i, p) in grid.positions.iter().enumerate() {
             let near = |&j: &u32| p.as_dvec3().distance(grid.positions[j as usize].as_dvec3()) < radius;
             let brute: Vec<u32> = (0..cloud.len() as u32).filter(near).collect();
