@@ -46,7 +46,7 @@ fn main() -> ExitCode {
         Ok(code) => code,
         Err(e) => {
             eprintln!("meniscus: {e}");
-            let no_device = matches!(e.downcast_ref(), Some(HostError::NoDevice { .. } | HostError::Loader(_)));
+            let no_device = matches!(e.downcast_ref(), Some(HostError::NoDevice { .. } | HostError::NoDriver { .. } | HostError::Loader(_)));
             ExitCode::from(if no_device { 3 } else { 1 })
         }
     }
