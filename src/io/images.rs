@@ -1,13 +1,10 @@
-//! Environment maps in, pictures out. Outputs appear complete or not at all.
+//! Environment maps in, pictures out.
 
 use crate::{Equirect, Error, twin::optics::decode_srgb};
 use image::{DynamicImage, ImageFormat, ImageReader};
-use std::{
-    io::{BufWriter, Write},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-/// Why an image could not be read or a file written.
+/// Why an image could not be read or encoded.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// Not there, or not readable.
@@ -35,20 +32,12 @@ pub enum ImageError {
         source: Error,
     },
     /// Could not be encoded.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}; a smaller picture may do", path.display())]
     Encode {
         /// File.
         path: PathBuf,
         /// Reason.
         source: image::ImageError,
-    },
-    /// The folder to write into is not there.
-    #[error("{}: there is no folder {}; create it", file.display(), folder.display())]
-    Folder {
-        /// File to be written.
-        file: PathBuf,
-        /// Its folder.
-        folder: PathBuf,
     },
     /// An extension nothing is written for.
     #[error("{}: the picture can be .png (sRGB, 8 bits) or .exr (linear, float)", .0.display())]
@@ -81,22 +70,12 @@ pub fn check_extension(path: &Path) -> Result<(), ImageError> {
     }
 }
 
-/// Checks early that the folder a file goes into is there.
-pub fn check_folder(path: &Path) -> Result<(), ImageError> {
-    let folder = parent(path);
-    if folder.is_dir() { Ok(()) } else { Err(ImageError::Folder { file: path.into(), folder: folder.into() }) }
-}
-
-fn parent(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 fn extension(path: &Path) -> Option<String> {
     path.extension().map(|e| e.to_string_lossy().to_lowercase())
 }
 
-/// Writes linear RGB as .png (sRGB, 8 bits) or .exr (linear, float).
-pub fn write_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<(), ImageError> {
+/// The bytes of a picture from linear RGB, as the extension of its name says: .png (sRGB, 8 bits) or .exr (linear, float).
+pub fn encode_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<Vec<u8>, ImageError> {
     let (image, format) = match extension(path).as_deref() {
         Some("png") => {
             let bytes = rgb.iter().flatten().map(|v| crate::twin::optics::srgb_byte(*v)).collect();
@@ -111,22 +90,5 @@ pub fn write_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<()
     let image = image.expect("one colour for each pixel");
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write_to(&mut bytes, format).map_err(|source| ImageError::Encode { path: path.into(), source })?;
-    write_file(path, bytes.get_ref())
-}
-
-/// Writes a file under a temporary name beside it, then renames it.
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
-    let io = |source| ImageError::Io { path: path.into(), source };
-    let mut file = tempfile::NamedTempFile::new_in(parent(path)).map_err(io)?;
-    let mut out = BufWriter::new(file.as_file_mut());
-    out.write_all(bytes).and_then(|()| out.flush()).map_err(io)?;
-    drop(out);
-    #[cfg(unix)]
-    {
-        // Temporary files are private; a picture is as readable as any new file.
-        use std::os::unix::fs::PermissionsExt;
-        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(io)?;
-    }
-    file.persist(path).map_err(|e| io(e.error))?;
-    Ok(())
+    Ok(bytes.into_inner())
 }

@@ -1,5 +1,7 @@
 //! From a particle file to particles as drawn.
 
+use crate::temporary;
+use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
@@ -8,7 +10,7 @@ use meniscus::{
     io::particles::{Invalid, check_finite, read},
     prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
 };
-use std::{error::Error, io::Write, path::Path, time::Duration};
+use std::{error::Error, path::Path, time::Duration};
 
 /// The dam break that is rendered when no file is named; see assets/README.md.
 const EMBEDDED: &[u8] = include_bytes!("../../../assets/dam_break.bgeo");
@@ -33,13 +35,13 @@ pub struct Scene {
 pub struct Source<'a> {
     pub file: Option<&'a Path>,
     pub radius: Option<f64>,
-    pub splash_threshold: Option<f32>,
+    pub splash_threshold: f32,
     pub drop_invalid: bool,
     pub prepare: Prepare,
 }
 
 /// Where classes and ellipsoids are made.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Prepare {
     /// On the CPU, before the frame.
     Cpu,
@@ -54,6 +56,11 @@ impl Prepare {
         self != Prepare::Cpu
     }
 
+    /// As the command line calls it.
+    pub fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned())
+    }
+
     fn search(self) -> Search {
         if self == Prepare::GpuRelation { Search::Relation } else { Search::Runs }
     }
@@ -66,8 +73,9 @@ impl Scene {
         let path = match source.file {
             Some(path) => path,
             None => {
-                embedded = tempfile::Builder::new().suffix(".bgeo").tempfile()?;
-                embedded.as_file().write_all(EMBEDDED)?;
+                embedded = temporary::scratch(".bgeo", EMBEDDED).map_err(|e| {
+                    format!("{}: {e}. Set TMPDIR to a folder with room", std::env::temp_dir().display())
+                })?;
                 embedded.path()
             }
         };
@@ -103,16 +111,15 @@ impl Scene {
         let axes: Option<Vec<Mat3>> = file.axes.as_ref().map(|a| a.iter().map(|m| m.as_mat3()).collect());
         let options = Options {
             support: file.support.map(|s| s as f32),
-            splash_threshold: source.splash_threshold.unwrap_or(Options::default().splash_threshold),
+            splash_threshold: source.splash_threshold,
             search: source.prepare.search(),
             ..Options::default()
         };
         if source.prepare.on_device() && (classes.is_some() || axes.is_some()) {
-            return Err(format!(
-                "{} brings classes or ellipsoids of its own, and --prepare gpu makes them anew: use --prepare cpu",
-                path.display()
-            )
-            .into());
+            return Err(
+                "it brings classes or ellipsoids of its own, and --prepare gpu makes them anew: use --prepare cpu"
+                    .into(),
+            );
         }
         let input = Input {
             positions: &positions,
