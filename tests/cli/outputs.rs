@@ -78,10 +78,14 @@ fn devices_and_pipes_are_written_to_and_stay() {
     let args = render(&block, &["-o", "null.png", "--stats", "/dev/stdout"]);
     let piped = run.command(&args);
     assert!(serde_json::from_slice::<serde_json::Value>(&piped.stdout).is_ok(), "{}", text(&piped));
-    let file = fs::File::create(run.path("s.json")).expect("created");
-    assert!(run.prepared(&args).stdout(file).status().expect("meniscus starts").success());
-    let written = fs::read(run.path("s.json")).expect("there");
-    assert!(serde_json::from_slice::<serde_json::Value>(&written).is_ok());
+    for name in ["/dev/stdout", "s.json"] {
+        let args = render(&block, &["-o", "null.png", "--stats", name]);
+        let file = fs::File::create(run.path("s.json")).expect("created");
+        let output = run.prepared(&args).stdout(file).output().expect("meniscus starts");
+        assert!(output.status.success(), "{}", text(&output));
+        let written = fs::read(run.path("s.json")).expect("there");
+        assert!(serde_json::from_slice::<serde_json::Value>(&written).is_ok(), "--stats {name}");
+    }
 }
 
 #[test]

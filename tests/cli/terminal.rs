@@ -33,7 +33,7 @@ fn closed_pipes_end_quietly() {
     quiet(unread(&run, &bench), "bench");
     quiet(unread(&run, &[&bench[..], &["-o", "b.json"]].concat()), "bench -o");
     assert!(run.path("b.json").exists());
-    // `-o` is not the reason: so is what statistics went to.
+    // Nor is it a failure where the pipe was to have the statistics.
     let stats = unread(&run, &[&["render", &block, "-o", "out.png", "--stats", "/dev/stdout"], &SMALL[..]].concat());
     assert!(stats.status.success(), "{}", text(&stats));
 }
@@ -71,7 +71,7 @@ fn nothing_reaches_the_terminal_unescaped_or_unbounded() {
     let clean = |output: Output| {
         let text = text(&output);
         assert!(!text.contains(|c: char| c == '\u{202e}' || (c.is_control() && c != '\n')), "{text:?}");
-        assert!(text.lines().all(|l| l.chars().count() < 1200), "{text}");
+        assert!(text.lines().all(|l| l.chars().count() < 2100), "{text}");
         text
     };
     let long = "z".repeat(100_000);

@@ -5,6 +5,7 @@ use crate::{
     temporary::{self, Folder},
     terminal,
 };
+use same_file::{Handle, is_same_file};
 use std::{
     fs,
     io::{self, ErrorKind, Write},
@@ -79,19 +80,23 @@ pub fn check(outputs: &[Named], dump: Option<&Path>, inputs: &[Named]) -> Result
     check_dump(folder, &place)
 }
 
-/// Names of the standard output, which is written to where it stands: opened anew it would begin at its start.
-const STDOUT: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
-
-/// Whether this is the program's own standard output.
+/// Whether this is the program's own standard output, by its names or as the file that it was sent to.
 fn is_stdout(path: &Path) -> bool {
-    STDOUT.iter().any(|p| path == Path::new(p))
+    let names = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+    names.iter().any(|p| path == Path::new(p))
+        || path.is_file() && Handle::from_path(path).is_ok_and(|h| Handle::stdout().is_ok_and(|out| h == out))
 }
 
-/// Pipes, terminals and devices are written to as they are: a rename would put a file in their place.
+/// Whether something is written to as it is, because a rename would put a file in its place: pipes, terminals, devices and
+/// what someone else has opened.
 fn special(path: &Path) -> bool {
-    // What is behind one of these may be a file, which must not be replaced under the hands of who opened it.
-    let opened = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc"].iter().any(|p| path.starts_with(p));
-    opened || fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
+    let opened = ["/dev/stderr", "/dev/fd", "/proc"].iter().any(|p| path.starts_with(p));
+    opened || is_stdout(path) || !plain(path)
+}
+
+/// Whether this is a file, or nothing yet.
+fn plain(path: &Path) -> bool {
+    fs::metadata(path).map_or(true, |m| m.is_file() || m.is_dir())
 }
 
 fn check_file(path: &Path) -> Result<(), OutputError> {
@@ -105,13 +110,13 @@ fn check_file(path: &Path) -> Result<(), OutputError> {
     if special(path) { Ok(()) } else { resolve(path).map(|_| ()) }
 }
 
-/// Whether two names are of one file, by whatever links; special files can be named twice.
+/// Whether two names are of one file, by whatever links; pipes and devices can be named twice.
 fn same(a: &Path, b: &Path) -> Result<bool, OutputError> {
-    if special(a) || special(b) {
+    if !plain(a) || !plain(b) {
         return Ok(false);
     }
     if a.exists() && b.exists() {
-        return same_file::is_same_file(a, b).map_err(failed(a));
+        return is_same_file(a, b).map_err(failed(a));
     }
     // What an input's name is of is for its reader to say.
     Ok(resolve(b).is_ok_and(|b| resolve(a).is_ok_and(|a| a == b)))
@@ -138,6 +143,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         return temporary::write(&resolve(path)?, bytes).map_err(failed(path));
     }
     let written = if is_stdout(path) {
+        // Where it stands: opened anew it would begin at its start.
         let mut out = io::stdout().lock();
         out.write_all(bytes).and_then(|()| out.flush())
     } else {

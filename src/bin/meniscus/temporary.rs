@@ -90,7 +90,10 @@ impl Temporary {
         let mut all = all();
         fs::rename(old, &kept)?;
         if let Err(e) = fs::rename(&self.0, old) {
-            fs::rename(&kept, old)?;
+            if fs::rename(&kept, old).is_err() {
+                // Better a folder too many than a dump lost.
+                all.retain(|p| *p != attic.0);
+            }
             return Err(e);
         }
         all.retain(|p| *p != self.0);

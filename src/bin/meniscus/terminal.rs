@@ -8,7 +8,7 @@ use std::{
 };
 
 /// The most characters of a line that are shown.
-const LONGEST: usize = 1000;
+const LONGEST: usize = 2000;
 
 /// The text that a command is for (devices, figures) could not be written.
 #[derive(Debug, thiserror::Error)]
