@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use meniscus::{
     Equirect, FrameInput, Settings,
     host::{Gpu, Instance, Session},
-    io::images,
+    io::{Budget, images},
     profile::FrameTimes,
     targets::LedgerEntry,
 };
@@ -25,6 +25,9 @@ pub struct Args {
     /// Blocks of 1 k, 10 k, 100 k, 1 M, 4 M and 10 M particles, and how time grows with their number
     #[arg(long)]
     pub scaling: bool,
+    /// Most memory that reading one file may take: a number with K, M, G or T
+    #[arg(long, value_name = "SIZE", default_value_t)]
+    pub max_memory: Budget,
     /// Leave out blocks of more particles
     #[arg(long, value_name = "N", default_value_t = 10_000_000)]
     pub max_particles: u32,
@@ -189,7 +192,14 @@ fn all(args: &Args, settings: &Settings, session: &mut Session) -> Result<Vec<Ru
 
 fn load(args: &Args, file: Option<&PathBuf>) -> Result<Scene, Box<dyn std::error::Error>> {
     let file = file.map(PathBuf::as_path);
-    Scene::load(&Source { file, radius: None, splash_threshold: None, drop_invalid: false, prepare: args.prepare })
+    Scene::load(&Source {
+        file,
+        radius: None,
+        splash_threshold: None,
+        drop_invalid: false,
+        budget: args.max_memory,
+        prepare: args.prepare,
+    })
 }
 
 const RADIUS: f32 = 0.01;

@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3};
 use meniscus::{
     Camera, Equirect, Error, FrameInput, Fresnel, Particles, Settings, Weighting,
     host::{Gpu, Instance, Session},
-    io::images,
+    io::{Budget, images},
     prepare::Report,
 };
 use std::{path::PathBuf, process::ExitCode};
@@ -39,7 +39,8 @@ pub struct Args {
     /// Vertical field of view in degrees
     #[arg(long, value_name = "DEG", default_value_t = 40.0)]
     pub fov_y: f32,
-    /// Equirectangular environment map, .hdr, .exr or .png; a procedural sky if not given
+    /// Equirectangular environment map, .hdr, .exr or .png; a procedural sky if not given. One that is finer than the
+    /// picture's pixels, or too large for half of --max-memory, is averaged down by a whole factor
     #[arg(long, value_name = "FILE")]
     pub env: Option<PathBuf>,
     /// Surfaces at which light bends: 1, 2 or 4
@@ -72,6 +73,10 @@ pub struct Args {
     /// Particles with less than this share of a filled body's density are splash
     #[arg(long, value_name = "T")]
     pub splash_threshold: Option<f32>,
+    /// Most memory that reading one file may take, with K, M, G or T. A small file may take less: 32 times its size and a
+    /// 32nd of this
+    #[arg(long, value_name = "SIZE", default_value_t)]
+    pub max_memory: Budget,
     /// Drop particles whose position is not finite instead of failing
     #[arg(long)]
     pub drop_invalid: bool,
@@ -163,7 +168,10 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     if args.dump_neighbours && !args.prepare.on_device() {
         return Err("--dump-neighbours lists what the device finds: add --prepare gpu".into());
     }
-    let environment = args.env.as_deref().map_or_else(|| Ok(Equirect::procedural_sky()), images::read_environment)?;
+    let environment = match args.env.as_deref() {
+        Some(path) => images::read_environment_within(path, Some(texels_around(args)), &args.max_memory)?,
+        None => Equirect::procedural_sky(),
+    };
     let instance = Instance::new(args.validate)?;
     let device = instance.pick(args.device.as_deref())?;
     let scene = Scene::load(&Source {
@@ -171,6 +179,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
         radius: args.radius,
         splash_threshold: args.splash_threshold,
         drop_invalid: args.drop_invalid,
+        budget: args.max_memory,
         prepare: args.prepare,
     })?;
     announce(&scene, &device.name, &device.driver);
@@ -190,6 +199,13 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     }
     println!("wrote {}", args.output.display());
     Ok(if messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(4) })
+}
+
+/// Texels around of an environment map that has as many to a degree as the middle of the picture has pixels.
+fn texels_around(args: &Args) -> u32 {
+    let height = f64::from(args.size[1]) * f64::from(args.supersample);
+    let focal_length = 0.5 * height / (0.5 * f64::from(args.fov_y).to_radians()).tan();
+    (std::f64::consts::TAU * focal_length).ceil() as u32
 }
 
 fn announce(scene: &Scene, device: &str, driver: &str) {

@@ -5,7 +5,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
     Class, Ellipsoid, Particles,
     host::{Session, Upload},
-    io::particles::{Invalid, check_finite, read},
+    io::{
+        Budget,
+        particles::{Invalid, check_finite, read_within},
+    },
     prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
 };
 use std::{error::Error, io::Write, path::Path, time::Duration};
@@ -35,6 +38,7 @@ pub struct Source<'a> {
     pub radius: Option<f64>,
     pub splash_threshold: Option<f32>,
     pub drop_invalid: bool,
+    pub budget: Budget,
     pub prepare: Prepare,
 }
 
@@ -71,7 +75,7 @@ impl Scene {
                 embedded.path()
             }
         };
-        let mut file = read(path)?;
+        let mut file = read_within(path, &source.budget)?;
         let policy = if source.drop_invalid { Invalid::Drop } else { Invalid::Reject };
         let dropped = check_finite(&mut file, policy, path)?;
         bar.finish_and_clear();
