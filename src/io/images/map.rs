@@ -118,11 +118,15 @@ impl Target {
 /// assert_eq!(reduction([16384, 8192], None, &Budget::default()), 3);
 /// ```
 pub fn reduction(size: [u32; 2], needed: Option<u32>, budget: &Budget) -> u32 {
+    let most = budget.bytes() / 2 / TEXEL;
     let fits = |factor: u32| {
         let [width, height] = size.map(|n| u64::from(n.div_ceil(factor)));
-        width * height <= budget.bytes() / 2 / TEXEL
+        width * height <= most
     };
     let enough = needed.map_or(1, |needed| size[0] / needed.max(1)).max(1);
+    // Rounding up to whole texels can ask for a little more than the root does.
+    let texels = f64::from(size[0]) * f64::from(size[1]);
+    let root = (texels / most.max(1) as f64).sqrt() as u32;
     let largest = size[0].max(size[1]).max(1);
-    (enough..=largest).find(|factor| fits(*factor)).unwrap_or(largest)
+    (root.max(enough)..=largest).find(|factor| fits(*factor)).unwrap_or(largest)
 }
