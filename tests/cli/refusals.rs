@@ -59,5 +59,7 @@ fn bad_parameters_are_refused() {
     refuse(3, &["--device", "no such device"], &["no such device", "meniscus info"]);
     run.refused(1, &["render", "-o", "out.gif"], &["out.gif", ".png"]);
     run.refused(1, &["render", "-o", "nowhere/out.png", "--size", "64x48"], &["nowhere/out.png"]);
+    let long = format!("{}.png", "x".repeat(300));
+    run.refused(1, &["render", "-o", &long, "--size", "64x48"], &["xxx.png", "cannot be written", "shorter"]);
     run.refused(2, &["render"], &["--output"]);
 }

@@ -131,7 +131,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
         )
         .into());
     }
-    let environment = args.options.environment()?;
+    let environment = args.options.environment(1)?;
     args.show(&format!(
         "device: {} ({}); meniscus {} {}",
         device.name,

@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3};
 use meniscus::{
     Camera, Equirect, Error, Fresnel, Particles, Settings, Weighting,
     io::{
+        Budget,
         images::{self, ImageError},
         particles::ReadError,
     },
@@ -36,7 +37,8 @@ pub struct Options {
     /// Vertical field of view in degrees
     #[arg(long, value_name = "DEG", default_value_t = 40.0)]
     pub fov_y: f32,
-    /// Equirectangular environment map, .hdr, .exr or .png; a procedural sky if not given
+    /// Equirectangular environment map, .hdr, .exr or .png; a procedural sky if not given. One that is finer than the
+    /// picture's pixels, or too large for half of --max-memory, is averaged down by a whole factor
     #[arg(long, value_name = "FILE")]
     pub env: Option<PathBuf>,
     /// Surfaces at which light bends: 1, 2 or 4
@@ -66,6 +68,10 @@ pub struct Options {
     /// Particles with less than this share of a filled body's density are splash
     #[arg(long, value_name = "T", default_value_t = prepare::Options::default().splash_threshold)]
     pub splash_threshold: f32,
+    /// Most memory that reading one file may take, with K, M, G or T. A small file may take less: 32 times its size and a
+    /// 32nd of this
+    #[arg(long, value_name = "SIZE", default_value_t)]
+    pub max_memory: Budget,
     /// Drop particles whose position is not finite instead of failing
     #[arg(long)]
     pub drop_invalid: bool,
@@ -117,8 +123,13 @@ fn parse_vector(s: &str) -> Result<DVec3, String> {
 }
 
 impl Options {
-    pub fn environment(&self) -> Result<Equirect, ImageError> {
-        self.env.as_deref().map_or_else(|| Ok(Equirect::procedural_sky()), images::read_environment)
+    /// The environment, as fine as the pixels in the middle of a picture that is rendered at a multiple of its size.
+    pub fn environment(&self, times: u32) -> Result<Equirect, ImageError> {
+        let Some(path) = &self.env else { return Ok(Equirect::procedural_sky()) };
+        let focal_length =
+            0.5 * f64::from(self.size[1]) * f64::from(times) / (0.5 * f64::from(self.fov_y).to_radians()).tan();
+        let texels_around = (std::f64::consts::TAU * focal_length).ceil().max(1.0) as u32;
+        images::read_environment_within(path, Some(texels_around), &self.max_memory)
     }
 
     /// Reads a particle file, or what is embedded, and prepares it as these options say.
@@ -128,6 +139,7 @@ impl Options {
             radius: self.radius,
             splash_threshold: self.splash_threshold,
             drop_invalid: self.drop_invalid,
+            budget: self.max_memory,
             prepare,
         };
         Scene::load(&source).map_err(|e| match file {

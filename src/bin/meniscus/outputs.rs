@@ -41,6 +41,8 @@ fn remedy(e: &io::Error) -> &'static str {
             "Make room there, or write to another disk"
         }
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => "Name a folder that you may write to",
+        ErrorKind::InvalidFilename => "Choose a shorter name",
+        ErrorKind::NotFound | ErrorKind::NotADirectory => "Create its folder",
         _ => "Name another place",
     }
 }

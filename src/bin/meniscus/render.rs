@@ -91,7 +91,7 @@ impl Job<'_> {
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     args.check()?;
-    let environment = args.options.environment()?;
+    let environment = args.options.environment(args.supersample)?;
     let instance = Instance::new(args.validate)?;
     let device = instance.pick(args.options.device.as_deref())?;
     let scene = args.options.load(args.file.as_deref(), args.prepare())?;

@@ -105,6 +105,7 @@ fn asked(args: &Args) -> Vec<(&'static str, Value)> {
         ("radius_given", json!(o.radius)),
         ("splash_threshold", json!(o.splash_threshold)),
         ("drop_invalid", json!(o.drop_invalid)),
+        ("max_memory", json!(o.max_memory.bytes())),
     ]
 }
 

@@ -1,13 +1,15 @@
 //! From a particle file to particles as drawn.
 
-use crate::temporary;
 use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
     Class, Ellipsoid, Particles,
     host::{Session, Upload},
-    io::particles::{Invalid, check_finite, read},
+    io::{
+        Budget,
+        particles::{Invalid, check_finite, read_bytes, read_within},
+    },
     prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
 };
 use std::{error::Error, path::Path, time::Duration};
@@ -37,6 +39,7 @@ pub struct Source<'a> {
     pub radius: Option<f64>,
     pub splash_threshold: f32,
     pub drop_invalid: bool,
+    pub budget: Budget,
     pub prepare: Prepare,
 }
 
@@ -69,17 +72,11 @@ impl Prepare {
 impl Scene {
     pub fn load(source: &Source) -> Result<Scene, Box<dyn Error>> {
         let bar = spinner("reading particles");
-        let embedded;
-        let path = match source.file {
-            Some(path) => path,
-            None => {
-                embedded = temporary::scratch(".bgeo", EMBEDDED).map_err(|e| {
-                    format!("{}: {e}. Set TMPDIR to a folder with room", std::env::temp_dir().display())
-                })?;
-                embedded.path()
-            }
+        let path = source.file.unwrap_or(Path::new("embedded dam_break.bgeo"));
+        let mut file = match source.file {
+            Some(path) => read_within(path, &source.budget)?,
+            None => read_bytes(path, EMBEDDED, &source.budget)?,
         };
-        let mut file = read(path)?;
         let policy = if source.drop_invalid { Invalid::Drop } else { Invalid::Reject };
         let dropped = check_finite(&mut file, policy, path)?;
         bar.finish_and_clear();

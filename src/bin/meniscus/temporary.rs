@@ -44,13 +44,9 @@ pub fn clean_up_on_signals() -> io::Result<()> {
 }
 
 /// One temporary file or folder; gone when this is dropped, unless it was renamed.
-pub struct Temporary(PathBuf);
+struct Temporary(PathBuf);
 
 impl Temporary {
-    pub fn path(&self) -> &Path {
-        &self.0
-    }
-
     /// As readable as any new file, which temporary ones are not by themselves.
     fn builder(mode: u32) -> tempfile::Builder<'static, 'static> {
         let mut builder = tempfile::Builder::new();
@@ -62,9 +58,9 @@ impl Temporary {
         builder
     }
 
-    fn file(parent: &Path, suffix: &str) -> io::Result<(Temporary, File)> {
+    fn file(parent: &Path) -> io::Result<(Temporary, File)> {
         let mut all = all();
-        let (file, path) = Self::builder(0o666).suffix(suffix).tempfile_in(parent)?.keep()?;
+        let (file, path) = Self::builder(0o666).tempfile_in(parent)?.keep()?;
         all.push(path.clone());
         Ok((Temporary(path), file))
     }
@@ -114,17 +110,10 @@ impl Drop for Temporary {
 
 /// Writes a file that is whole as soon as it is there. `path` has no links in it.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let (temporary, mut file) = Temporary::file(path.parent().unwrap_or(path), "")?;
+    let (temporary, mut file) = Temporary::file(path.parent().unwrap_or(path))?;
     file.write_all(bytes)?;
     drop(file);
     temporary.rename(path)
-}
-
-/// A file for as long as this is held, for readers that want a file.
-pub fn scratch(suffix: &str, bytes: &[u8]) -> io::Result<Temporary> {
-    let (temporary, mut file) = Temporary::file(&std::env::temp_dir(), suffix)?;
-    file.write_all(bytes)?;
-    Ok(temporary)
 }
 
 /// A folder that is whole as soon as it is there.

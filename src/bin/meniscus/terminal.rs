@@ -1,6 +1,7 @@
 //! The one way to the terminal. What is shown has no control characters and no more than so many letters, wherever it came
 //! from, and a terminal that cannot be written to is no reason to panic.
 
+use meniscus::io::quote;
 use std::{
     fmt::Display,
     io::{self, ErrorKind, Write},
@@ -54,19 +55,10 @@ fn write(to: &mut dyn Write, text: &str) -> io::Result<()> {
     to.flush()
 }
 
-/// Text as it can be shown: control characters and those that turn or hide what stands around them are escaped, and of
-/// a long text the middle is left out, because the start names the file and the end says what to do.
+/// Text as it can be shown: what cannot be printed is escaped, and of a long text the middle is left out, because the
+/// start names the file and the end says what to do.
 pub fn plain(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' => {
-                shown.extend(c.escape_unicode());
-            }
-            c if c.is_control() => shown.extend(c.escape_default()),
-            c => shown.push(c),
-        }
-    }
+    let shown: String = quote::escape(text).collect();
     let count = shown.chars().count();
     if count <= LONGEST {
         return shown;
