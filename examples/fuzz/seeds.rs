@@ -12,8 +12,10 @@ use super::pack;
 /// A file's content before it is packed, and how that is done.
 pub struct Seed {
     pub bytes: Vec<u8>,
-    pack: fn(&[u8]) -> Vec<u8>,
+    pack: Pack,
 }
+
+type Pack = fn(&[u8]) -> Vec<u8>;
 
 impl Seed {
     pub fn pack(&self, bytes: &[u8]) -> Vec<u8> {
@@ -69,7 +71,7 @@ pub fn of(format: &str) -> Vec<Seed> {
     .map(plain)
     .collect();
     // The same content again, packed.
-    let more: &[fn(&[u8]) -> Vec<u8>] = match format {
+    let more: &[Pack] = match format {
         "bgeo" => &[pack::gzip],
         "npz" => &[
             |array| pack::npz(&[("position", array)], Stored),

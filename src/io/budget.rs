@@ -5,8 +5,8 @@
 //!
 //! * What is held at once, the file's own bytes included, is at most [`MULTIPLE`] times the file's size plus a floor, a
 //!   [`FLOOR_SHARE`]th of the cap; and never more than the cap: 2 GiB, or what `--max-memory` says.
-//! * What is unpacked on the way, whether or not it is held, is at most the cap plus [`MULTIPLE`] times the file's size.
-//!   That bounds time.
+//! * What is unpacked on the way, whether or not it is held, is at most [`UNPACKED`] times as much as that would be without
+//!   the cap. That bounds time.
 //! * Environment maps are read block by block and averaged down to what may be held: see
 //!   [`reduction`](super::images::reduction). A map has at most [`MAP_TEXELS`] texels, and [`MAP_TEXELS_PER_BYTE`] more for
 //!   each byte of its file. That bounds time too.
@@ -19,6 +19,8 @@ use std::str::FromStr;
 pub const MULTIPLE: u64 = 32;
 /// The floor is the cap divided by this: 64 MiB, 2.8 million positions, of 2 GiB.
 pub const FLOOR_SHARE: u64 = 32;
+/// Bytes that may be unpacked for each that may be held.
+pub const UNPACKED: u64 = 8;
 /// Texels that any environment map may have: twice 16384 x 8192.
 pub const MAP_TEXELS: u64 = 1 << 28;
 /// Texels that it may have beyond for each byte of its file.
@@ -49,8 +51,12 @@ impl Budget {
 
     /// Bytes that may be held while a file of `size` bytes is read, itself included.
     pub const fn allowance(&self, size: u64) -> u64 {
-        let allowance = (self.bytes / FLOOR_SHARE).saturating_add(size.saturating_mul(MULTIPLE));
+        let allowance = self.uncapped(size);
         if allowance < self.bytes { allowance } else { self.bytes }
+    }
+
+    const fn uncapped(&self, size: u64) -> u64 {
+        (self.bytes / FLOOR_SHARE).saturating_add(size.saturating_mul(MULTIPLE))
     }
 }
 
@@ -146,7 +152,7 @@ impl Ledger {
 
     /// Notes bytes that were decompressed and are not kept.
     pub(crate) fn unpack(&self, bytes: u64, what: &str) -> Result<(), OverBudget> {
-        let most = self.budget.bytes.saturating_add(self.file.saturating_mul(MULTIPLE));
+        let most = self.budget.uncapped(self.file).saturating_mul(UNPACKED);
         self.add(&self.unpacked, bytes, most, what)
     }
 

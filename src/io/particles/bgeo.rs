@@ -2,7 +2,7 @@
 //!
 //! Own code: the one crate that reads BGEO panics on vectors of floats or integers, which Partio writes.
 
-use std::io::Read;
+use std::io::{BufReader, Read};
 
 use flate2::bufread::MultiGzDecoder;
 use glam::DVec3;
@@ -21,7 +21,7 @@ const WORDS: usize = 1 << 16;
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     if source.bytes.starts_with(&[0x1f, 0x8b]) {
         let inner = MultiGzDecoder::new(source.bytes);
-        let mut stream = Metered { inner, ledger: source.ledger, what: "the unpacked gzip stream" };
+        let mut stream = BufReader::new(Metered { inner, ledger: source.ledger, what: "the unpacked gzip stream" });
         let file = read_points(source, &mut stream, None)?;
         // gzip's checksum is at its end.
         std::io::copy(&mut stream, &mut std::io::sink()).map_err(|error| source.broken("gzip", error))?;

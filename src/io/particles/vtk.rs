@@ -223,8 +223,9 @@ impl Walk<'_> {
             return false;
         }
         let rest = &self.sections.source.bytes[self.sections.at..];
-        let blank = find(rest, b"\n\n").into_iter().chain(find(rest, b"\n\r\n")).min();
-        self.sections.at = blank.map_or(self.sections.source.bytes.len(), |blank| self.sections.at + blank);
+        let lines = rest.split_inclusive(|b| *b == b'\n');
+        let length: usize = lines.take_while(|line| !line.trim_ascii().is_empty()).map(<[u8]>::len).sum();
+        self.sections.at += length;
         true
     }
 }

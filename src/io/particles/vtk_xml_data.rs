@@ -122,11 +122,13 @@ impl Array<'_> {
                     false => part(data, header_length, total, false).map_err(bad)?,
                 };
                 let mut buffer = vec![0; PART];
+                let mut zlib = ZlibDecoder::new(&[][..]);
                 for (i, size) in sizes.iter().enumerate() {
                     let (block, after) = rest.split_at(*size);
                     rest = after;
                     let full = if i + 1 == head[0] && head[2] != 0 { head[2] } else { head[1] };
-                    let inner = ZlibDecoder::new(block);
+                    zlib.reset(block);
+                    let inner = &mut zlib;
                     let mut stream =
                         Metered { inner, ledger: source.ledger, what: "unpacked blocks" }.take(full as u64);
                     let mut unpacked = 0;
