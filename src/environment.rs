@@ -24,11 +24,11 @@ impl Equirect {
                 "give one RGB triple for each of width x height pixels",
             ));
         }
-        if let Some(bad) = rgb.iter().flatten().position(|v| !v.is_finite() || *v < 0.0) {
-            let what = format!("{} at pixel {}", rgb[bad / 3][bad % 3], bad / 3);
-            return Err(Error::parameter("environment map", what, "light is finite and at least 0"));
+        let mut map = EquirectBuilder::new(width, height, 1)?;
+        for (y, row) in (0..).zip(rgb.chunks_exact(width as usize)) {
+            map.add(0, 1, y, row.iter().copied())?;
         }
-        Ok(Equirect { width, height, texels: rgb.iter().flat_map(|c| [c[0], c[1], c[2], 1.0]).collect() })
+        Ok(map.finish())
     }
 
     /// Width and height in texels.
@@ -55,6 +55,114 @@ impl Equirect {
             }
         }
         Equirect::new(width, height, &rgb).expect("the sky is finite")
+    }
+}
+
+/// Makes an [`Equirect`] from texels that come row by row, block by block or in any order, and holds no more of them than
+/// the result has: each of its texels is the mean, in linear light, of the area it covers.
+#[derive(Clone, Debug)]
+pub struct EquirectBuilder {
+    size: [u32; 2],
+    map: Equirect,
+    /// For each column and row given, where it goes.
+    columns: Vec<Share>,
+    rows: Vec<Share>,
+    scale: f32,
+}
+
+/// Where a column or row goes: the texel its near edge falls on, the part of it that does, and the part of the next texel.
+#[derive(Clone, Copy, Debug)]
+struct Share {
+    at: u32,
+    near: f32,
+    far: f32,
+}
+
+impl Share {
+    /// For each of `from` columns laid over `to`, at most as many.
+    fn all(from: u32, to: u32) -> Vec<Share> {
+        let (from, to) = (u64::from(from), u64::from(to));
+        (0..from)
+            .map(|i| {
+                // In parts of which `from` make a texel of the result, and `to` one that is given.
+                let (start, end) = (i * to, (i + 1) * to);
+                let edge = (start / from + 1) * from;
+                let near = edge.min(end) - start;
+                Share { at: (start / from) as u32, near: near as f32 / to as f32, far: (to - near) as f32 / to as f32 }
+            })
+            .collect()
+    }
+}
+
+impl EquirectBuilder {
+    /// For a map of `width` x `height` texels, averaged down by the whole `factor`: the result has ⌈width / factor⌉ x
+    /// ⌈height / factor⌉ texels, 16 bytes each. With a factor of 1 it has exactly the texels that are given.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if a size or the factor is 0.
+    pub fn new(width: u32, height: u32, factor: u32) -> Result<EquirectBuilder, Error> {
+        if width == 0 || height == 0 || factor == 0 {
+            let what = format!("{width}x{height}, averaged over {factor}");
+            return Err(Error::parameter("environment map", what, "none of these can be 0"));
+        }
+        let [w, h] = [width, height].map(|n| n.div_ceil(factor));
+        let texels = vec![0.0; 4 * w as usize * h as usize];
+        let scale = ((f64::from(w) / f64::from(width)) * (f64::from(h) / f64::from(height))) as f32;
+        Ok(EquirectBuilder {
+            size: [width, height],
+            map: Equirect { width: w, height: h, texels },
+            columns: Share::all(width, w),
+            rows: Share::all(height, h),
+            scale,
+        })
+    }
+
+    /// Adds linear RGB of row `y`, for the columns `x`, `x + step`, `x + 2 step` and so on. Each texel is to be given once;
+    /// one that never is counts as black.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if a value is negative or not finite, or a texel is not on the map.
+    pub fn add(&mut self, x: u32, step: u32, y: u32, rgb: impl IntoIterator<Item = [f32; 3]>) -> Result<(), Error> {
+        let [width, height] = self.size;
+        let exact = self.size == self.map.size();
+        let mut columns = self.columns.iter().skip(x as usize).step_by(step.max(1) as usize);
+        let row = self.rows.get(y as usize);
+        for (i, color) in rgb.into_iter().enumerate() {
+            let (Some(row), Some(column)) = (row, columns.next()) else {
+                let what = format!("given a texel in row {y} beyond {width}x{height}");
+                return Err(Error::parameter("environment map", what, "give width x height texels"));
+            };
+            if let Some(bad) = color.into_iter().find(|v| !v.is_finite() || *v < 0.0) {
+                let pixel = u64::from(y) * u64::from(width) + u64::from(x) + i as u64 * u64::from(step);
+                let what = format!("{bad} at pixel {pixel}");
+                return Err(Error::parameter("environment map", what, "light is finite and at least 0"));
+            }
+            let at = 4 * (row.at as usize * self.map.width as usize + column.at as usize);
+            if exact {
+                self.map.texels[at..at + 3].copy_from_slice(&color);
+                continue;
+            }
+            for (next_row, down) in [(0, row.near), (self.map.width as usize, row.far)] {
+                for (next_column, right) in [(0, column.near), (1, column.far)] {
+                    let share = down * right * self.scale;
+                    if share > 0.0 {
+                        let at = at + 4 * (next_row + next_column);
+                        self.map.texels[at..at + 3].iter_mut().zip(color).for_each(|(sum, v)| *sum += share * v);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The map.
+    pub fn finish(mut self) -> Equirect {
+        for texel in self.map.texels.as_chunks_mut::<4>().0 {
+            // Rounding may take the mean of the brightest values there are beyond them.
+            texel[..3].iter_mut().for_each(|v| *v = v.min(f32::MAX));
+            texel[3] = 1.0;
+        }
+        self.map
     }
 }
 

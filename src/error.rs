@@ -16,7 +16,7 @@ pub enum Error {
         missing: String,
     },
     /// A Vulkan call failed.
-    #[error("{what}: {result}")]
+    #[error("{what}: {result}{remedy}", remedy = remedy(*result))]
     Vulkan {
         /// What was being made or recorded.
         what: String,
@@ -59,6 +59,23 @@ pub enum Error {
     /// The caller broke the order of calls.
     #[error("{0}")]
     Order(&'static str),
+}
+
+/// What to do about a Vulkan call that failed.
+pub(crate) fn remedy(result: vk::Result) -> &'static str {
+    match result {
+        vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
+            ". Use a smaller size or fewer particles"
+        }
+        vk::Result::ERROR_DEVICE_LOST => {
+            ". The driver gave up, or the frame took longer than the system allows: use a smaller size, fewer particles \
+             or another device"
+        }
+        vk::Result::ERROR_LAYER_NOT_PRESENT | vk::Result::ERROR_EXTENSION_NOT_PRESENT => {
+            ". Unset VK_INSTANCE_LAYERS and VK_LOADER_LAYERS_ENABLE, or install what they name"
+        }
+        _ => ". Try another device or a newer driver",
+    }
 }
 
 impl Error {

@@ -53,7 +53,7 @@ pub mod targets;
 pub mod twin;
 
 pub use device::Host;
-pub use environment::Equirect;
+pub use environment::{Equirect, EquirectBuilder};
 pub use error::Error;
 pub use particles::{Class, Ellipsoid, Particles};
 pub use renderer::{Background, EnvironmentInput, EnvironmentShape, FrameInput, Renderer, SceneInput};

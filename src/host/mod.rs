@@ -6,7 +6,7 @@ mod session;
 mod upload;
 mod validation;
 
-use crate::{Error, device};
+use crate::{Error, device, error::remedy};
 use ash::vk;
 pub use canvas::Canvas;
 use gpu_allocator::{
@@ -24,6 +24,17 @@ pub enum HostError {
     /// No loader.
     #[error("no Vulkan loader: {0}. Install libvulkan1 and a driver (mesa-vulkan-drivers renders on the CPU)")]
     Loader(ash::LoadingError),
+    /// The loader is there, but no driver that it could load.
+    #[error(
+        "no Vulkan driver could be loaded ({result}){told}. Check that driver manifests are JSON and name libraries that \
+         are there, unset what points elsewhere, or install mesa-vulkan-drivers, which renders on the CPU"
+    )]
+    NoDriver {
+        /// What the loader answered.
+        result: vk::Result,
+        /// The variables that tell the loader where drivers are, as far as they are set.
+        told: String,
+    },
     /// No device, or none that is wanted.
     #[error(
         "no usable Vulkan device{wanted}: {found}. `meniscus info` lists devices; mesa-vulkan-drivers renders on the CPU"
@@ -40,14 +51,28 @@ pub enum HostError {
     )]
     NoValidation,
     /// A Vulkan call failed.
-    #[error("{0}: {1}")]
+    #[error("{0}: {1}{remedy}", remedy = remedy(*.1))]
     Vulkan(&'static str, vk::Result),
     /// The renderer refused.
     #[error(transparent)]
     Renderer(#[from] Error),
     /// The allocator refused.
-    #[error("device memory: {0}")]
+    #[error("device memory: {0}. Use a smaller size or fewer particles")]
     Memory(#[from] gpu_allocator::AllocationError),
+}
+
+/// Where the loader looks for drivers if these are set.
+const DRIVER_VARIABLES: [&str; 3] = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES"];
+
+/// A failure of the loader before there is an instance. Whatever it calls it (a manifest that is not JSON is "out of host
+/// memory" to some loaders), nothing but drivers has been looked at by then.
+fn no_driver(result: vk::Result) -> HostError {
+    let set = DRIVER_VARIABLES.iter().filter_map(|name| {
+        let value = std::env::var_os(name)?;
+        Some(format!("{name} is \"{}\"", value.to_string_lossy()))
+    });
+    let told = set.collect::<Vec<_>>().join(", ");
+    HostError::NoDriver { result, told: if told.is_empty() { told } else { format!("; {told}") } }
 }
 
 fn vulkan(what: &'static str) -> impl FnOnce(vk::Result) -> HostError {
@@ -99,8 +124,8 @@ impl Instance {
         // SAFETY: as above; no handles are involved yet.
         let (layers, extensions) = unsafe {
             (
-                entry.enumerate_instance_layer_properties().map_err(vulkan("list of layers"))?,
-                entry.enumerate_instance_extension_properties(None).map_err(vulkan("list of extensions"))?,
+                entry.enumerate_instance_layer_properties().map_err(no_driver)?,
+                entry.enumerate_instance_extension_properties(None).map_err(no_driver)?,
             )
         };
         if validate && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(validation::LAYER)) {
@@ -130,11 +155,10 @@ impl Instance {
         }
         // SAFETY: the info and all it points to outlive the call; the messages are boxed and outlive the instance.
         let handle = unsafe { entry.create_instance(&info, None) }.map_err(|e| match e {
-            // The loader's word for "no driver at all".
-            vk::Result::ERROR_INCOMPATIBLE_DRIVER => {
-                HostError::NoDevice { wanted: String::new(), found: "there is no driver".to_owned() }
+            vk::Result::ERROR_LAYER_NOT_PRESENT | vk::Result::ERROR_EXTENSION_NOT_PRESENT => {
+                HostError::Vulkan("instance", e)
             }
-            e => HostError::Vulkan("instance", e),
+            e => no_driver(e),
         })?;
         let mut instance =
             Instance { debug: None, messenger: vk::DebugUtilsMessengerEXT::null(), messages, handle, _entry: entry };
@@ -159,7 +183,7 @@ impl Instance {
     /// Every device, best first.
     pub fn devices(&self) -> Result<Vec<DeviceInfo>, HostError> {
         // SAFETY: the instance is alive.
-        let handles = unsafe { self.handle.enumerate_physical_devices() }.map_err(vulkan("list of devices"))?;
+        let handles = unsafe { self.handle.enumerate_physical_devices() }.map_err(no_driver)?;
         let mut devices: Vec<_> = handles.into_iter().map(|h| self.describe(h)).collect();
         devices.sort_by_key(|d| d.rank);
         Ok(devices)

@@ -1,76 +1,124 @@
-//! Environment maps in, pictures out. Outputs appear complete or not at all.
+//! Environment maps in, pictures out.
 
-use crate::{Equirect, Error, twin::optics::decode_srgb};
-use image::{DynamicImage, ImageFormat, ImageReader};
+mod exr;
+mod hdr;
+mod map;
+mod png;
+
+pub use map::reduction;
+
+use super::budget::{Budget, OverBudget};
+use super::{guard, quote};
+use crate::{Equirect, Error};
+use image::{DynamicImage, ImageFormat};
+use map::{Fault, Frame};
 use std::{
-    io::{BufWriter, Write},
+    fs::File,
+    io::{BufRead, BufReader, Cursor, ErrorKind, Seek},
     path::{Path, PathBuf},
 };
 
-/// Why an image could not be read or a file written.
+/// Why an image could not be read or encoded.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the fields are what the messages show")]
 pub enum ImageError {
     /// Not there, or not readable.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// File.
-        path: PathBuf,
-        /// Reason.
-        source: std::io::Error,
-    },
+    #[error("{}: cannot be read ({source}); {}", quote::path(path), reading_remedy(source.kind()))]
+    Io { path: PathBuf, source: std::io::Error },
     /// Not an image, or damaged.
-    #[error("{}: {source}; environment maps are .hdr, .exr or .png", path.display())]
-    Decode {
-        /// File.
-        path: PathBuf,
-        /// Reason.
-        source: image::ImageError,
-    },
+    #[error("{}: {}; environment maps are whole .hdr, .exr or .png files", quote::path(path), quote::cut(detail, 160))]
+    Decode { path: PathBuf, detail: String },
     /// Readable, but no environment map.
-    #[error("{}: {source}", path.display())]
-    Content {
-        /// File.
-        path: PathBuf,
-        /// Reason.
-        source: Error,
-    },
+    #[error("{}: {source}", quote::path(path))]
+    Content { path: PathBuf, source: Error },
+    /// Reading it takes more memory than its [`Budget`].
+    #[error("{}: {source}", quote::path(path))]
+    TooLarge { path: PathBuf, source: OverBudget },
+    /// A decoder panicked (in programs that unwind).
+    #[error(
+        "{}: reading it failed in a way that nobody foresaw; save it again, and report it if other programs read it",
+        quote::path(path)
+    )]
+    Panicked { path: PathBuf, panic: String },
     /// Could not be encoded.
-    #[error("{}: {source}", path.display())]
-    Encode {
-        /// File.
-        path: PathBuf,
-        /// Reason.
-        source: image::ImageError,
-    },
-    /// The folder to write into is not there.
-    #[error("{}: there is no folder {}; create it", file.display(), folder.display())]
-    Folder {
-        /// File to be written.
-        file: PathBuf,
-        /// Its folder.
-        folder: PathBuf,
-    },
+    #[error("{}: the picture cannot be encoded ({}); choose another size or format", quote::path(path), quote::quote(&source.to_string()))]
+    Encode { path: PathBuf, source: image::ImageError },
     /// An extension nothing is written for.
-    #[error("{}: the picture can be .png (sRGB, 8 bits) or .exr (linear, float)", .0.display())]
+    #[error("{}: the picture can be .png (sRGB, 8 bits) or .exr (linear, float); choose one of them", quote::path(.0))]
     Extension(PathBuf),
 }
 
-/// Reads an equirectangular map: linear light from .hdr and .exr, sRGB from .png.
-pub fn read_environment(path: &Path) -> Result<Equirect, ImageError> {
-    let io = |source| ImageError::Io { path: path.into(), source };
-    let decode = |source| ImageError::Decode { path: path.into(), source };
-    let reader = ImageReader::open(path).map_err(io)?.with_guessed_format().map_err(io)?;
-    let srgb = reader.format() == Some(ImageFormat::Png);
-    let image = reader.decode().map_err(decode)?.into_rgb32f();
-    let (width, height) = image.dimensions();
-    if width.abs_diff(2 * height) > height / 4 {
-        let what = format!("{width}x{height}");
-        let source = Error::parameter("environment map", what, "an equirectangular map is twice as wide as it is high");
-        return Err(ImageError::Content { path: path.into(), source });
+fn reading_remedy(kind: ErrorKind) -> &'static str {
+    match kind {
+        ErrorKind::NotFound => "check the path",
+        ErrorKind::IsADirectory => "name one image in it",
+        ErrorKind::PermissionDenied => "check its permissions",
+        _ => "check the disk it is on, and its permissions",
     }
-    let curve = |v: f32| if srgb { decode_srgb(v) } else { v };
-    let rgb: Vec<[f32; 3]> = image.pixels().map(|p| p.0.map(curve)).collect();
-    Equirect::new(width, height, &rgb).map_err(|source| ImageError::Content { path: path.into(), source })
+}
+
+/// Reads an equirectangular map: linear light from .hdr and .exr, sRGB from .png; within the default [`Budget`].
+///
+/// # Errors
+/// [`ImageError`] with the file's name: it is no map, is damaged, or has light that is negative or not finite.
+pub fn read_environment(path: &Path) -> Result<Equirect, ImageError> {
+    read_environment_within(path, None, &Budget::default())
+}
+
+/// [`read_environment`] with a budget of your own. Texels come block by block and are averaged down, in linear light, by
+/// [`reduction`]: where `needed` texels around suffice, and where more would not fit. For texels as fine as a picture's
+/// pixels that is 2π times the focal length in pixels.
+///
+/// # Errors
+/// As [`read_environment`].
+pub fn read_environment_within(path: &Path, needed: Option<u32>, budget: &Budget) -> Result<Equirect, ImageError> {
+    let io = |source| ImageError::Io { path: path.into(), source };
+    let file = File::open(path).map_err(io)?;
+    let metadata = file.metadata().map_err(io)?;
+    if metadata.is_dir() {
+        return Err(io(ErrorKind::IsADirectory.into()));
+    }
+    let frame = Frame { budget, file: metadata.len(), needed };
+    decode(path, BufReader::with_capacity(1 << 16, file), &frame)
+}
+
+/// [`read_environment_within`] for a file's content; `name` stands in messages.
+///
+/// # Errors
+/// As [`read_environment`], but for those of the file system.
+pub fn environment_from_bytes(
+    name: &Path,
+    bytes: &[u8],
+    needed: Option<u32>,
+    budget: &Budget,
+) -> Result<Equirect, ImageError> {
+    decode(name, Cursor::new(bytes), &Frame { budget, file: bytes.len() as u64, needed })
+}
+
+/// The format is what the first bytes say.
+fn decode(name: &Path, mut input: impl BufRead + Seek, frame: &Frame<'_>) -> Result<Equirect, ImageError> {
+    let read = || {
+        let start = input.fill_buf()?;
+        let map = if start.starts_with(b"\x89PNG\r\n\x1a\n") {
+            png::read(input, frame)?
+        } else if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+            exr::read(input, frame)?
+        } else if start.starts_with(b"#?RADIANCE") {
+            hdr::read(input, frame)?
+        } else {
+            return Err(Fault::Corrupt("its first bytes are of no format that is known here".into()));
+        };
+        Ok(map.finish())
+    };
+    let path = name.to_path_buf();
+    match guard::quietly(read) {
+        Ok(Ok(map)) => Ok(map),
+        Ok(Err(Fault::Io(source))) => Err(ImageError::Io { path, source }),
+        Ok(Err(Fault::Corrupt(detail))) => Err(ImageError::Decode { path, detail }),
+        Ok(Err(Fault::Content(source))) => Err(ImageError::Content { path, source }),
+        Ok(Err(Fault::TooLarge(source))) => Err(ImageError::TooLarge { path, source }),
+        Err(panic) => Err(ImageError::Panicked { path, panic }),
+    }
 }
 
 /// Checks early, before anything is rendered, that a picture of this name can be written.
@@ -81,22 +129,12 @@ pub fn check_extension(path: &Path) -> Result<(), ImageError> {
     }
 }
 
-/// Checks early that the folder a file goes into is there.
-pub fn check_folder(path: &Path) -> Result<(), ImageError> {
-    let folder = parent(path);
-    if folder.is_dir() { Ok(()) } else { Err(ImageError::Folder { file: path.into(), folder: folder.into() }) }
-}
-
-fn parent(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 fn extension(path: &Path) -> Option<String> {
     path.extension().map(|e| e.to_string_lossy().to_lowercase())
 }
 
-/// Writes linear RGB as .png (sRGB, 8 bits) or .exr (linear, float).
-pub fn write_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<(), ImageError> {
+/// The bytes of a picture from linear RGB, as the extension of its name says: .png (sRGB, 8 bits) or .exr (linear, float).
+pub fn encode_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<Vec<u8>, ImageError> {
     let (image, format) = match extension(path).as_deref() {
         Some("png") => {
             let bytes = rgb.iter().flatten().map(|v| crate::twin::optics::srgb_byte(*v)).collect();
@@ -111,22 +149,5 @@ pub fn write_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<()
     let image = image.expect("one colour for each pixel");
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write_to(&mut bytes, format).map_err(|source| ImageError::Encode { path: path.into(), source })?;
-    write_file(path, bytes.get_ref())
-}
-
-/// Writes a file under a temporary name beside it, then renames it.
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
-    let io = |source| ImageError::Io { path: path.into(), source };
-    let mut file = tempfile::NamedTempFile::new_in(parent(path)).map_err(io)?;
-    let mut out = BufWriter::new(file.as_file_mut());
-    out.write_all(bytes).and_then(|()| out.flush()).map_err(io)?;
-    drop(out);
-    #[cfg(unix)]
-    {
-        // Temporary files are private; a picture is as readable as any new file.
-        use std::os::unix::fs::PermissionsExt;
-        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(io)?;
-    }
-    file.persist(path).map_err(|e| io(e.error))?;
-    Ok(())
+    Ok(bytes.into_inner())
 }

@@ -1,3 +1,8 @@
 //! Particle files and images.
+pub mod budget;
+mod guard;
 pub mod images;
 pub mod particles;
+pub mod quote;
+
+pub use budget::Budget;

@@ -1,22 +1,35 @@
 //! Reads particle files: positions and the few arrays a renderer can use beside them.
 //!
 //! The format follows from the file's extension (see [`FORMATS`]). Every failure, a truncated or corrupt file included, is a
-//! [`ReadError`] that names the file, the place where that is known, and what to do about it.
+//! [`ReadError`] that names the file, the place where that is known, and what to do about it. What could be read in two ways
+//! (decimal commas, repeated columns) is refused rather than guessed. What a file may take is bounded: see
+//! [`budget`](super::budget).
 
 mod bgeo;
+mod csv;
+mod numbers;
 mod numpy;
+mod numpy_header;
 mod ply;
+mod ply_header;
+mod source;
 mod text;
 mod vtk;
+mod vtk_sections;
 mod vtk_xml;
+mod vtk_xml_data;
+mod xyz;
 
 use std::fmt;
-use std::io::ErrorKind;
-use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_hook};
+use std::fs::File;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DMat3, DVec3};
+
+use super::budget::{Budget, Ledger, OverBudget};
+use super::{guard, quote};
+use source::Source;
 
 /// The known extensions, lower case and without dot, each with what is read from it.
 pub const FORMATS: &[(&str, &str)] = &[
@@ -25,8 +38,8 @@ pub const FORMATS: &[(&str, &str)] = &[
     ("vtp", "VTK XML poly data, as .vtu"),
     ("ply", "PLY, ASCII or binary: element `vertex` with x, y, z; property `class`"),
     ("bgeo", "Houdini/Partio BGEO version 5, plain or gzip; attribute `class`"),
-    ("xyz", "raw little-endian float32 triples, or text columns x y z"),
-    ("csv", "columns x, y, z by header, or the first three; columns `class`, `radius`"),
+    ("xyz", "raw little-endian float32 triples, or text columns x y z with decimal points"),
+    ("csv", "columns x, y, z by header, or the first three, with decimal points; columns `class`, `radius`"),
     ("npy", "NumPy array N x 3"),
     ("npz", "NumPy archive: `position` N x 3; `radius`, `support`, `class`, `axes` N x 3 x 3"),
 ];
@@ -81,82 +94,118 @@ impl fmt::Display for At {
 #[expect(missing_docs, reason = "the fields are what the messages show")]
 pub enum ReadError {
     /// There is no such file.
-    #[error("{}: no such file; check the path", path.display())]
+    #[error("{}: no such file; check the path", quote::path(path))]
     NotFound { path: PathBuf },
     /// The path is a directory.
-    #[error("{}: is a directory; name one particle file in it", path.display())]
+    #[error("{}: is a directory; name one particle file in it", quote::path(path))]
     IsDirectory { path: PathBuf },
     /// The system does not let it be read.
-    #[error("{}: cannot be read ({source}); check its permissions", path.display())]
+    #[error("{}: cannot be read ({source}); check its permissions", quote::path(path))]
     Unreadable { path: PathBuf, source: std::io::Error },
     /// It has no bytes at all.
-    #[error("{}: is empty (0 bytes); write it again", path.display())]
+    #[error("{}: is empty (0 bytes); write it again", quote::path(path))]
     Empty { path: PathBuf },
     /// Its extension is none of [`FORMATS`].
-    #[error("{}: unknown extension `{extension}`; convert to, or rename to the true one of: {}", path.display(), known_extensions())]
+    #[error(
+        "{}: unknown extension `{}`; convert to, or rename to the true one of: {}",
+        quote::path(path),
+        quote::quote(extension),
+        known_extensions()
+    )]
     UnknownExtension { path: PathBuf, extension: String },
     /// It is truncated, corrupt, or not what its extension says.
-    #[error("{}{at}: {detail}; {remedy}", path.display())]
+    #[error("{}{at}: {detail}; {remedy}", quote::path(path))]
     Malformed { path: PathBuf, at: At, detail: String, remedy: &'static str },
     /// It is valid, but without the array, columns or element that positions are read from.
-    #[error("{}: holds no positions: {wanted}, found {found}; rename or export them", path.display())]
+    #[error("{}: holds no positions: {wanted}, found {found}; rename or export them", quote::path(path))]
     NoPositions { path: PathBuf, wanted: &'static str, found: String },
     /// An array has dimensions or a type that cannot be used.
-    #[error("{}: `{array}` is {found}, expected {expected}; reshape or convert it", path.display())]
+    #[error("{}: `{array}` is {found}, expected {expected}; reshape or convert it", quote::path(path))]
     WrongShape { path: PathBuf, array: String, found: String, expected: &'static str },
     /// An array has not one entry for each particle.
-    #[error("{}: `{array}` has {found} entries for {expected} particles; export all arrays from the same frame", path.display())]
+    #[error(
+        "{}: `{array}` has {found} entries for {expected} particles; export all arrays from the same frame",
+        quote::path(path)
+    )]
     UnequalLengths { path: PathBuf, array: String, found: usize, expected: usize },
     /// Positions are infinite or not a number.
-    #[error("{}: {count} of {total} positions are not finite, the first at index {first}; `--drop-invalid` leaves them out", path.display())]
+    #[error(
+        "{}: {count} of {total} positions are not finite, the first at index {first}; `--drop-invalid` leaves them out",
+        quote::path(path)
+    )]
     NonFinite { path: PathBuf, first: usize, count: usize, total: usize },
+    /// Reading it takes more memory than its [`Budget`].
+    #[error("{}: {source}", quote::path(path))]
+    TooLarge { path: PathBuf, source: OverBudget },
+    /// A parser panicked (in programs that unwind).
+    #[error(
+        "{}: reading it failed in a way that nobody foresaw; export it again, and report it if other programs read it",
+        quote::path(path)
+    )]
+    Panicked { path: PathBuf, panic: String },
 }
 
 fn known_extensions() -> String {
     FORMATS.iter().map(|(extension, _)| *extension).collect::<Vec<_>>().join(", ")
 }
 
-/// Reads the particle file at `path`, in the format its extension (in either case) says.
+/// Reads the particle file at `path`, in the format its extension (in either case) says, within the default [`Budget`].
 ///
 /// A valid file without particles gives empty positions. Non-finite positions pass: call [`check_finite`] next.
 ///
 /// # Errors
-/// Any [`ReadError`] but [`ReadError::NonFinite`]. Panics inside the parsers become [`ReadError::Malformed`] (in programs
-/// that unwind). To keep those quiet the process's panic hook is replaced during the call, and put back after it; so reads
-/// from several threads take turns.
+/// Any [`ReadError`] but [`ReadError::NonFinite`]. To keep panics inside parsers quiet the process's panic hook is replaced
+/// during the call, and put back after it; so reads from several threads take turns.
 pub fn read(path: &Path) -> Result<ParticleFile, ReadError> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    let reader = match extension.as_str() {
-        "vtk" => vtk::read,
-        "vtu" | "vtp" => vtk_xml::read,
-        "ply" => ply::read,
-        "bgeo" => bgeo::read,
-        "xyz" => text::read_xyz,
-        "csv" => text::read_csv,
-        "npy" => numpy::read_npy,
-        "npz" => numpy::read_npz,
-        _ if path.is_dir() => return Err(ReadError::IsDirectory { path: path.into() }),
-        _ if !path.exists() => return Err(ReadError::NotFound { path: path.into() }),
-        _ => {
-            return Err(ReadError::UnknownExtension { path: path.into(), extension });
-        }
-    };
-    let bytes = std::fs::read(path).map_err(|source| match source.kind() {
+    read_within(path, &Budget::default())
+}
+
+/// [`read`] with a cap of your own.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_within(path: &Path, budget: &Budget) -> Result<ParticleFile, ReadError> {
+    let missing = |source: std::io::Error| match source.kind() {
         ErrorKind::NotFound => ReadError::NotFound { path: path.into() },
         _ if path.is_dir() => ReadError::IsDirectory { path: path.into() },
         _ => ReadError::Unreadable { path: path.into(), source },
-    })?;
-    if bytes.is_empty() {
-        return Err(ReadError::Empty { path: path.into() });
+    };
+    if let Err(error) = reader(path) {
+        return Err(match path.metadata() {
+            Ok(metadata) if metadata.is_dir() => ReadError::IsDirectory { path: path.into() },
+            Err(source) if source.kind() == ErrorKind::NotFound => ReadError::NotFound { path: path.into() },
+            _ => error,
+        });
     }
-    let source = Source { path, bytes: &bytes };
-    let file = quietly(|| reader(&source))
-        .unwrap_or_else(|panic| Err(source.malformed(At::Unknown, format!("its reader gave up ({panic})"))))?;
+    let file = File::open(path).map_err(missing)?;
+    let stated = file.metadata().map_err(missing)?.len();
+    let too_large = |source| ReadError::TooLarge { path: path.into(), source };
+    Ledger::new(*budget, stated).map_err(too_large)?;
+    // Devices and pipes state no size: what is read is what counts.
+    let mut bytes = Vec::with_capacity(stated as usize);
+    file.take(budget.bytes().saturating_add(1)).read_to_end(&mut bytes).map_err(missing)?;
+    read_bytes(path, &bytes, budget)
+}
+
+/// Reads a particle file's content; `name` gives its format, and stands in messages.
+///
+/// # Errors
+/// As [`read`], but for those of the file system.
+pub fn read_bytes(name: &Path, bytes: &[u8], budget: &Budget) -> Result<ParticleFile, ReadError> {
+    let reader = reader(name)?;
+    if bytes.is_empty() {
+        return Err(ReadError::Empty { path: name.into() });
+    }
+    let ledger =
+        Ledger::new(*budget, bytes.len() as u64).map_err(|source| ReadError::TooLarge { path: name.into(), source })?;
+    let source = Source { path: name, bytes, ledger: &ledger };
+    let file = guard::quietly(|| reader(&source))
+        .unwrap_or_else(|panic| Err(ReadError::Panicked { path: name.into(), panic }))?;
     let lengths = [("class", file.classes.as_ref().map(Vec::len)), ("axes", file.axes.as_ref().map(Vec::len))];
     for (array, length) in lengths {
         if let Some(found) = length.filter(|length| *length != file.positions.len()) {
             return Err(ReadError::UnequalLengths {
-                path: path.into(),
+                path: name.into(),
                 array: array.into(),
                 found,
                 expected: file.positions.len(),
@@ -164,6 +213,24 @@ pub fn read(path: &Path) -> Result<ParticleFile, ReadError> {
         }
     }
     Ok(file)
+}
+
+type Reader = fn(&Source<'_>) -> Result<ParticleFile, ReadError>;
+
+/// The reader for the extension of `path`.
+fn reader(path: &Path) -> Result<Reader, ReadError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    Ok(match extension.as_str() {
+        "vtk" => vtk::read,
+        "vtu" | "vtp" => vtk_xml::read,
+        "ply" => ply::read,
+        "bgeo" => bgeo::read,
+        "xyz" => xyz::read,
+        "csv" => csv::read,
+        "npy" => numpy::read_npy,
+        "npz" => numpy::read_npz,
+        _ => return Err(ReadError::UnknownExtension { path: path.into(), extension }),
+    })
 }
 
 /// Applies `policy` to the positions of `file` that are infinite or not a number; returns how many particles were dropped.
@@ -187,114 +254,4 @@ pub fn check_finite(file: &mut ParticleFile, policy: Invalid, path: &Path) -> Re
     file.classes.iter_mut().for_each(|classes| compact(classes, &keep));
     file.axes.iter_mut().for_each(|axes| compact(axes, &keep));
     Ok(count)
-}
-
-/// A file's content and, for error messages, its path.
-struct Source<'a> {
-    path: &'a Path,
-    bytes: &'a [u8],
-}
-
-impl Source<'_> {
-    fn malformed(&self, at: At, detail: impl Into<String>) -> ReadError {
-        self.malformed_but(at, detail, "it may be truncated or corrupt: copy or export it again")
-    }
-
-    fn malformed_but(&self, at: At, detail: impl Into<String>, remedy: &'static str) -> ReadError {
-        // Foreign messages quote what they could not parse: keep to one line without control characters.
-        let detail: String = detail.into();
-        let line = detail.split_whitespace().collect::<Vec<_>>().join(" ");
-        ReadError::Malformed {
-            path: self.path.into(),
-            at,
-            detail: line.chars().filter(|c| !c.is_control()).take(300).collect(),
-            remedy,
-        }
-    }
-
-    fn no_positions(&self, wanted: &'static str, found: impl Into<String>) -> ReadError {
-        ReadError::NoPositions { path: self.path.into(), wanted, found: found.into() }
-    }
-
-    fn wrong_shape(&self, array: &str, found: impl Into<String>, expected: &'static str) -> ReadError {
-        ReadError::WrongShape { path: self.path.into(), array: array.into(), found: found.into(), expected }
-    }
-
-    /// Checks the values of an array named `class`, which in a foreign file could mean anything.
-    fn classes(&self, values: &[f64]) -> Result<Vec<u8>, ReadError> {
-        if let Some(i) = values.iter().position(|v| *v != 0.0 && *v != 1.0) {
-            let detail = format!("`class` is {} at index {i}, and only 0 (splash) and 1 (body) are known", values[i]);
-            return Err(self.malformed_but(At::Unknown, detail, "rename the array if it means something else"));
-        }
-        Ok(values.iter().map(|v| *v as u8).collect())
-    }
-
-    /// The length an array or column named `name` stands for: its median; `None` if it is empty.
-    fn length(&self, name: &str, mut values: Vec<f64>) -> Result<Option<f64>, ReadError> {
-        if let Some(bad) = values.iter().find(|v| !(v.is_finite() && **v > 0.0)) {
-            return Err(self.malformed_but(
-                At::Unknown,
-                format!("`{name}` is {bad}"),
-                "it must be positive: correct or remove it",
-            ));
-        }
-        values.sort_by(f64::total_cmp);
-        Ok(values.get(values.len() / 2).copied())
-    }
-}
-
-/// Groups a flat list of coordinates; a rest shorter than three is left out.
-fn points(values: &[f64]) -> Vec<DVec3> {
-    values.as_chunks().0.iter().copied().map(DVec3::from_array).collect()
-}
-
-/// Decodes packed numbers of the type `name` as VTK calls it, in XML or legacy files; `None` for an unknown type.
-fn numbers(bytes: &[u8], name: &str, big_endian: bool) -> Option<Vec<f64>> {
-    macro_rules! decode {
-        ($t:ty) => {
-            bytes
-                .as_chunks()
-                .0
-                .iter()
-                .map(|c| if big_endian { <$t>::from_be_bytes(*c) } else { <$t>::from_le_bytes(*c) } as f64)
-                .collect()
-        };
-    }
-    Some(match name {
-        "Float32" | "float" => decode!(f32),
-        "Float64" | "double" => decode!(f64),
-        "Int8" => decode!(i8),
-        "UInt8" => decode!(u8),
-        "Int16" => decode!(i16),
-        "UInt16" => decode!(u16),
-        "Int32" => decode!(i32),
-        "UInt32" => decode!(u32),
-        "Int64" => decode!(i64),
-        "UInt64" => decode!(u64),
-        _ => return None,
-    })
-}
-
-fn find(haystack: &[u8], needle: &[u8]) -> Option<usize> {
-    haystack.windows(needle.len()).position(|window| window == needle)
-}
-
-/// Calls `f`; a panic in it is not printed, and its message returned.
-fn quietly<T>(f: impl FnOnce() -> T) -> Result<T, String> {
-    type Hook = Arc<dyn Fn(&PanicHookInfo<'_>) + Sync + Send>;
-    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-    let _lock = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let (before, here): (Hook, _) = (take_hook().into(), std::thread::current().id());
-    let during = before.clone();
-    set_hook(Box::new(move |info| {
-        if std::thread::current().id() != here {
-            during(info);
-        }
-    }));
-    let result = catch_unwind(AssertUnwindSafe(f));
-    set_hook(Box::new(move |info| before(info)));
-    result.map_err(|panic| match panic.downcast::<String>() {
-        Ok(message) => *message,
-        Err(panic) => panic.downcast_ref::<&str>().unwrap_or(&"no message").to_string(),
-    })
 }

@@ -28,20 +28,36 @@ fn a_pass_has_one_home() {
     assert!(found >= 6, "only {found} passes");
 }
 
+fn walk(folder: &Path, check: &mut dyn FnMut(&Path)) {
+    for entry in fs::read_dir(folder).expect("readable folder") {
+        let path = entry.expect("readable").path();
+        if path.is_dir() { walk(&path, check) } else { check(&path) }
+    }
+}
+
 #[test]
 fn no_file_is_too_long() {
-    fn walk(folder: &Path, check: &mut dyn FnMut(&Path)) {
-        for entry in fs::read_dir(folder).expect("readable folder") {
-            let path = entry.expect("readable").path();
-            if path.is_dir() { walk(&path, check) } else { check(&path) }
-        }
-    }
     for folder in ["src", "glsl", "tests", "build"] {
         walk(&root().join(folder), &mut |path| {
             let lines = fs::read_to_string(path).map_or(0, |s| s.lines().count());
             assert!(lines <= 500, "{} has {lines} lines", path.display());
         });
     }
+}
+
+/// Macros that panic where what they write cannot be written: the library says nothing, and the command says what it has
+/// to say through src/bin/meniscus/terminal.rs.
+#[test]
+fn nothing_is_printed_past_the_terminal() {
+    walk(&root().join("src"), &mut |path| {
+        let text = fs::read_to_string(path).expect("UTF-8");
+        for word in ["print!(", "println!(", "dbg!("] {
+            assert!(!text.contains(word), "{} has {word}", path.display());
+        }
+        let streams = text.contains("io::stdout()") || text.contains("io::stderr()");
+        let allowed = ["terminal.rs", "outputs.rs"].iter().any(|name| path.ends_with(name));
+        assert!(!streams || allowed, "{} writes to the terminal by itself", path.display());
+    });
 }
 
 /// Every crate in the lock file can be had under one of these.

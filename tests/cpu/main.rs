@@ -1,5 +1,9 @@
 //! Everything that needs no device: files, preparation, twins against closed forms.
 
+#[cfg(feature = "io")]
+mod environment;
+#[cfg(feature = "io")]
+mod hostile;
 mod house;
 #[cfg(feature = "io")]
 mod io;

@@ -1,15 +1,16 @@
 //! `meniscus bench`: what each pass takes, in figures that can be repeated.
 
 use crate::{
-    camera::{self, View},
-    report,
-    scene::{Prepare, Scene, Source, progress},
+    empty, on,
+    options::Options,
+    outputs, report,
+    scene::{Prepare, Scene, progress},
+    terminal::{self, NotWritten},
 };
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use meniscus::{
-    Equirect, FrameInput, Settings,
+    FrameInput, Settings,
     host::{Gpu, Instance, Session},
-    io::images,
     profile::FrameTimes,
     targets::LedgerEntry,
 };
@@ -28,39 +29,37 @@ pub struct Args {
     /// Leave out blocks of more particles
     #[arg(long, value_name = "N", default_value_t = 10_000_000)]
     pub max_particles: u32,
-    /// Width and height in pixels
-    #[arg(long, value_name = "WxH", default_value = "1024x768", value_parser = crate::render::parse_size)]
-    pub size: [u32; 2],
+    #[command(flatten)]
+    pub options: Options,
     /// Frames that are measured
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
     /// Frames before them
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub warmup: u32,
-    /// Device whose name or driver contains this; the best one if not given
-    #[arg(long, value_name = "NAME")]
-    pub device: Option<String>,
-    /// Where classes and ellipsoids are made
-    #[arg(long, value_enum, default_value = "gpu")]
-    pub prepare: Prepare,
-    /// Surfaces at which light bends: 1, 2 or 4
-    #[arg(long, value_name = "N", default_value_t = 4)]
-    pub refractions: u32,
-    /// Total internal reflections followed
-    #[arg(long, value_name = "N", default_value_t = 4)]
-    pub internal_reflections: u32,
-    /// Plane-fitting window in pixels: odd
-    #[arg(long, value_name = "N", default_value_t = 9)]
-    pub window: u32,
-    /// Plane-fitting iterations
-    #[arg(long, value_name = "N", default_value_t = 2)]
-    pub iterations: u32,
-    /// Draw every particle, also those that others hide
-    #[arg(long)]
-    pub no_culling: bool,
     /// Where to write the figures: .json or .csv; the terminal shows them in any case
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+}
+
+impl Args {
+    pub fn prepare(&self) -> Prepare {
+        self.options.prepare.unwrap_or(Prepare::Gpu)
+    }
+
+    /// Shows a line of figures. Where a file gets them too, the terminal's may be lost.
+    pub fn show(&self, line: &str) -> Result<(), NotWritten> {
+        terminal::line(line).or_else(|e| if self.output.is_some() { Ok(()) } else { Err(e) })
+    }
+
+    /// Refuses what cannot be written, before anything is measured.
+    fn check(&self) -> Result<(), Box<dyn std::error::Error>> {
+        let Some(path) = &self.output else { return Ok(()) };
+        report::check_extension(path)?;
+        let mut inputs: Vec<_> = self.files.iter().map(|p| ("a particle file", p.as_path())).collect();
+        inputs.extend(self.options.env.as_deref().map(|p| ("the environment map (--env)", p)));
+        Ok(outputs::check(&[("the figures (--output)", path)], None, &inputs)?)
+    }
 }
 
 /// What one scene gave.
@@ -69,6 +68,7 @@ pub struct Run {
     pub particles: usize,
     pub radius: f32,
     pub prepare_cpu_ms: f64,
+    pub settings: Settings,
     /// Each pass's milliseconds, frame by frame, in the order of the frame; passes of one name are summed.
     pub passes: Vec<(String, Vec<f64>)>,
     /// First to last timestamp, and the sum of the passes, frame by frame.
@@ -115,15 +115,12 @@ const SIZES: [u32; 6] = [1_000, 10_000, 100_000, 1_000_000, 4_000_000, 10_000_00
 pub const SEED: u64 = 1;
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
-    if let Some(path) = &args.output {
-        report::check_extension(path)?;
-        images::check_folder(path)?;
-    }
+    args.check()?;
     if args.scaling && args.files.is_empty() && !args.scenes && args.max_particles < SIZES[0] {
         return Err(format!("--max-particles {} leaves no block: use {} or more", args.max_particles, SIZES[0]).into());
     }
     let instance = Instance::new(false)?;
-    let device = instance.pick(args.device.as_deref())?;
+    let device = instance.pick(args.options.device.as_deref())?;
     // Older layers do not say that they are there, but the loader was told.
     let asked = ["VK_INSTANCE_LAYERS", "VK_LOADER_LAYERS_ENABLE"]
         .into_iter()
@@ -134,62 +131,58 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
         )
         .into());
     }
-    let settings = Settings {
-        refractions: args.refractions,
-        internal_reflections: args.internal_reflections,
-        window: args.window,
-        iterations: args.iterations,
-        occlusion_culling: !args.no_culling,
-        absorption: Vec3::new(1.0, 0.35, 0.2),
-        ..Settings::default()
-    };
-    settings.validate()?;
-    println!("device: {} ({}); meniscus {} {}", device.name, device.driver, env!("CARGO_PKG_VERSION"), report::COMMIT);
-    let gpu = Gpu::new(&instance, device)?;
-    let mut session = Session::new(&gpu, args.size, &Equirect::procedural_sky())?;
-    let runs = all(args, &settings, &mut session);
+    let environment = args.options.environment(1)?;
+    args.show(&format!(
+        "device: {} ({}); meniscus {} {}",
+        device.name,
+        device.driver,
+        env!("CARGO_PKG_VERSION"),
+        report::COMMIT
+    ))?;
+    let on_device = on(&device);
+    let gpu = Gpu::new(&instance, device).map_err(|e| on_device(e.into()))?;
+    let mut session = Session::new(&gpu, args.options.size, &environment).map_err(|e| on_device(e.into()))?;
+    let runs = all(args, &mut session);
     session.end();
-    let runs = runs?;
+    let runs = runs.map_err(on_device)?;
     let growth = args.scaling.then(|| report::growth(&runs));
     if let Some((exponent, from)) = growth.flatten() {
-        println!("preparation grows with the power {exponent:.3} of the number of particles, from {from} on");
+        args.show(&format!(
+            "preparation grows with the power {exponent:.3} of the number of particles, from {from} on"
+        ))?;
     }
     if let Some(path) = &args.output {
-        report::write(path, args, &settings, &gpu.info, &runs)?;
-        println!("wrote {}", path.display());
+        report::write(path, args, &gpu.info, &runs)?;
+        args.show(&format!("wrote {}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn all(args: &Args, settings: &Settings, session: &mut Session) -> Result<Vec<Run>, Box<dyn std::error::Error>> {
+fn all(args: &Args, session: &mut Session) -> Result<Vec<Run>, Box<dyn std::error::Error>> {
+    let place = args.prepare();
     let mut runs = Vec::new();
     let mut add = |name: String, scene: Scene| -> Result<(), Box<dyn std::error::Error>> {
-        let run = measure(args, settings, session, name, &scene)?;
-        report::print(&run, args.prepare.on_device());
+        let run = measure(args, session, name, &scene)?;
+        report::print(&run, args)?;
         runs.push(run);
         Ok(())
     };
     for file in &args.files {
-        add(file.display().to_string(), load(args, Some(file))?)?;
+        add(file.display().to_string(), args.options.load(Some(file), place)?)?;
     }
     if args.scenes || (args.files.is_empty() && !args.scaling) {
-        add("embedded dam break".into(), load(args, None)?)?;
-        add("block of 100,000".into(), Scene::synthetic(block(100_000), RADIUS, args.prepare)?)?;
-        add("20,000 droplets".into(), Scene::synthetic(droplets(20_000), RADIUS, args.prepare)?)?;
+        add("embedded dam break".into(), args.options.load(None, place)?)?;
+        add("block of 100,000".into(), Scene::synthetic(block(100_000), RADIUS, place)?)?;
+        add("20,000 droplets".into(), Scene::synthetic(droplets(20_000), RADIUS, place)?)?;
     }
     if args.scaling {
         for n in SIZES {
             if n <= args.max_particles {
-                add(format!("block of {n}"), Scene::synthetic(block(n), RADIUS, args.prepare)?)?;
+                add(format!("block of {n}"), Scene::synthetic(block(n), RADIUS, place)?)?;
             }
         }
     }
     Ok(runs)
-}
-
-fn load(args: &Args, file: Option<&PathBuf>) -> Result<Scene, Box<dyn std::error::Error>> {
-    let file = file.map(PathBuf::as_path);
-    Scene::load(&Source { file, radius: None, splash_threshold: None, drop_invalid: false, prepare: args.prepare })
 }
 
 const RADIUS: f32 = 0.01;
@@ -226,21 +219,15 @@ fn droplets(count: u32) -> Vec<Vec3> {
     (0..count).map(|_| offset(&mut state, 100.0 * RADIUS)).collect()
 }
 
-fn measure(
-    args: &Args,
-    settings: &Settings,
-    session: &mut Session,
-    name: String,
-    scene: &Scene,
-) -> Result<Run, Box<dyn std::error::Error>> {
-    let aspect = args.size[0] as f32 / args.size[1] as f32;
-    let view = View { eye: None, target: None, up: DVec3::Y, fov_y_deg: 40.0 };
-    let (camera, eye) = camera::frame(&view, scene.origin, &scene.particles, aspect, 0.1 * scene.particles.radius)?;
-    let upload = scene.give(args.prepare, session)?;
+fn measure(args: &Args, session: &mut Session, name: String, scene: &Scene) -> Result<Run, Box<dyn std::error::Error>> {
+    let (options, particles) = (&args.options, &scene.particles);
+    let (camera, eye) = options.camera(scene)?;
+    let settings = options.settings(particles, 1)?;
+    let upload = scene.give(args.prepare(), session)?;
     let input = FrameInput {
         eye_inside: scene.inside(eye),
         positions: upload.as_ref().map(|u| scene.on_device(u)),
-        ..FrameInput::new(0, &camera, settings, ash::vk::ImageView::null())
+        ..FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null())
     };
     let bar = progress(u64::from(args.warmup + args.frames), "frames");
     let mut frames: Vec<FrameTimes> = Vec::new();
@@ -252,6 +239,9 @@ fn measure(
         }
     }
     bar.finish_and_clear();
+    if let Some(why) = empty::explain(session, particles, &camera, &settings, options.size)? {
+        terminal::complain(format!("meniscus: {name}: {why}"));
+    }
     let mut order = Vec::new();
     let mut passes: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for (i, frame) in frames.iter().enumerate() {
@@ -268,7 +258,8 @@ fn measure(
         scene: name,
         particles: scene.positions.len(),
         radius: scene.particles.radius,
-        prepare_cpu_ms: if args.prepare.on_device() { 0.0 } else { scene.prepare_ms },
+        prepare_cpu_ms: if args.prepare().on_device() { 0.0 } else { scene.prepare_ms },
+        settings,
         passes,
         span: frames.iter().map(|f| f.span_ms).collect(),
         sum: frames.iter().map(|f| f.passes.iter().map(|p| p.ms).sum()).collect(),

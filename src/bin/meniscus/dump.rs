@@ -1,11 +1,9 @@
 //! `--dump`: every intermediate target as .npy, so that any pass can be recomputed from the dump alone.
 
-use crate::{codes, render::Job};
+use crate::{codes, options, outputs::Dump, render::Job};
 use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
-    Fresnel, Weighting,
     host::Session,
-    io::images::write_file,
     shader::{SIDE_BACK, SIDE_FRONT},
     space::Space,
     targets::Id,
@@ -15,21 +13,10 @@ use npyz::WriterBuilder;
 use serde_json::json;
 use std::{collections::BTreeMap, error::Error, path::Path};
 
-/// How the names of targets begin.
-const TARGETS: [&str; 4] = ["splash_front_", "splash_back_", "body_front_", "body_back_"];
-
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    // Targets of an earlier frame that this one does without would not belong to this frame.json.
-    for entry in std::fs::read_dir(folder)?.flatten() {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if TARGETS.iter().any(|t| name.starts_with(t)) && name.ends_with(".npy") {
-            std::fs::remove_file(entry.path())?;
-        }
-    }
-    let out = Folder { path: folder, size: job.size, radius: job.scene.particles.radius };
+    let out = Folder { dump: Dump::new(folder)?, size: job.size, radius: job.scene.particles.radius };
     let needs = session.renderer.needs(&job.settings, true);
     let smooth = (needs.body_depth(), needs.body_normal());
     let targets = [
@@ -53,12 +40,12 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     let direction = floats(session.words(Id::Direction, 0)?);
     out.array("final_direction", 3, direction.chunks_exact(4).flat_map(|d| [d[0], d[1], d[2]]))?;
     out.array("color_linear", 3, session.picture()?.into_iter().flatten())?;
-    particles(&folder.join("particles.npz"), job)?;
+    out.dump.write("particles.npz", &particles(job)?)?;
     if job.args.dump_neighbours {
-        neighbours(&folder.join("neighbours.npz"), job, session)?;
+        out.dump.write("neighbours.npz", &neighbours(job, session)?)?;
     }
-    write_file(&folder.join("frame.json"), serde_json::to_string_pretty(&frame(job))?.as_bytes())?;
-    Ok(())
+    out.dump.write("frame.json", serde_json::to_string_pretty(&frame(job))?.as_bytes())?;
+    Ok(out.dump.finish()?)
 }
 
 fn floats(words: Option<Vec<u32>>) -> Vec<f32> {
@@ -66,7 +53,7 @@ fn floats(words: Option<Vec<u32>>) -> Vec<f32> {
 }
 
 struct Folder<'a> {
-    path: &'a Path,
+    dump: Dump<'a>,
     size: [u32; 2],
     /// Shaders measure lengths in it, dumps in world units.
     radius: f32,
@@ -77,8 +64,7 @@ impl Folder<'_> {
     fn array(&self, name: &str, channels: u64, data: impl Iterator<Item = f32>) -> Result<()> {
         let (h, w) = (u64::from(self.size[1]), u64::from(self.size[0]));
         let shape: &[u64] = if channels == 1 { &[h, w] } else { &[h, w, channels] };
-        write_file(&self.path.join(format!("{name}.npy")), &npy(shape, data)?)?;
-        Ok(())
+        Ok(self.dump.write(&format!("{name}.npy"), &npy(shape, data)?)?)
     }
 
     fn maps(&self, surface: &str, raw: &str, depths: &[u32], normals: &[u32]) -> Result<()> {
@@ -100,7 +86,7 @@ fn npy<T: npyz::AutoSerialize>(shape: &[u64], data: impl Iterator<Item = T>) -> 
     Ok(bytes)
 }
 
-fn particles(path: &Path, job: &Job) -> Result<()> {
+fn particles(job: &Job) -> Result<Vec<u8>> {
     let (p, origin) = (job.particles(), job.scene.origin);
     let n = p.ellipsoids.len() as u64;
     let mut bytes = std::io::Cursor::new(Vec::new());
@@ -123,12 +109,11 @@ fn particles(path: &Path, job: &Job) -> Result<()> {
         w.finish()?;
     }
     drop(npz); // writes the archive's directory
-    write_file(path, bytes.get_ref())?;
-    Ok(())
+    Ok(bytes.into_inner())
 }
 
 /// `offsets` (one more than particles) into `indices`, by index in the file.
-fn neighbours(path: &Path, job: &Job, session: &mut Session) -> Result<()> {
+fn neighbours(job: &Job, session: &mut Session) -> Result<Vec<u8>> {
     let (offsets, indices) = crate::prepared::neighbours(session, job.scene.positions.len())?;
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut npz = npyz::npz::NpzWriter::new(&mut bytes);
@@ -139,8 +124,7 @@ fn neighbours(path: &Path, job: &Job, session: &mut Session) -> Result<()> {
     w.extend(indices)?;
     w.finish()?;
     drop(npz); // writes the archive's directory
-    write_file(path, bytes.get_ref())?;
-    Ok(())
+    Ok(bytes.into_inner())
 }
 
 /// 4 x 4, row-major, for column vectors.
@@ -174,10 +158,7 @@ pub fn frame(job: &Job) -> serde_json::Value {
         "window": s.window,
         "iterations": s.iterations,
         "sigma": s.sigma * radius,
-        "weighting": match s.weighting {
-            Weighting::ViewDependent => "view-dependent",
-            Weighting::Euclidean => "euclidean",
-        },
+        "weighting": options::name(&options::WEIGHTING, s.weighting),
         "plane_fit_guards": {
             "grazing": meniscus::shader::FIT_GRAZING_LIMIT,
             "update": meniscus::shader::FIT_UPDATE_LIMIT * s.sigma * radius,
@@ -185,10 +166,7 @@ pub fn frame(job: &Job) -> serde_json::Value {
         },
         "refractions": s.refractions,
         "internal_reflections": s.internal_reflections,
-        "fresnel": match s.fresnel {
-            Fresnel::Schlick => "schlick",
-            Fresnel::Exact => "exact",
-        },
+        "fresnel": options::name(&options::FRESNEL, s.fresnel),
         "ior": s.ior,
         "absorption": s.absorption.to_array(),
         "sampling": {
@@ -203,6 +181,6 @@ pub fn frame(job: &Job) -> serde_json::Value {
         "path_length": "length inside the liquid, all intervals, world units",
         "normals": "eye space, outward: fronts towards the viewer, backs away from it",
         "particle_classes": {"0": "splash", "1": "body"},
-        "command": std::env::args().collect::<Vec<_>>(),
+        "command": options::command(),
     })
 }

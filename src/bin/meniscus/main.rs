@@ -1,25 +1,33 @@
 //! The `meniscus` command: a caller of the library like any other.
+// A write to a closed pipe or a full disk is no reason to panic: see `terminal`.
+#![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 mod bench;
 mod camera;
 mod codes;
 mod dump;
+mod empty;
 mod info;
+mod options;
+mod outputs;
 mod prepared;
 mod render;
 mod report;
 mod scene;
 mod stats;
+mod temporary;
+mod terminal;
 
-use clap::{Parser, Subcommand};
-use meniscus::host::HostError;
-use std::process::ExitCode;
+use clap::{Parser, Subcommand, error::ContextValue};
+use meniscus::host::{DeviceInfo, HostError};
+use std::{error::Error, process::ExitCode};
+use terminal::NotWritten;
 
 /// Particle liquids with complex refractions, in screen space, on Vulkan.
 #[derive(Parser)]
 #[command(
     version,
-    after_help = "Exit codes: 0 done; 1 a file, a parameter or the device failed; 2 wrong usage; 3 no usable Vulkan device;\n4 done, but validation (--validate) had something to say."
+    after_help = "Exit codes: 0 done; 1 a file, a parameter or the device failed; 2 wrong usage; 3 no usable Vulkan device;\n4 done, but validation (--validate) had something to say; 130 and 143 ended by SIGINT and SIGTERM."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -37,17 +45,62 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    run().unwrap_or_else(|e| match e.downcast_ref() {
+        Some(e) if NotWritten::reader_left(e) => ExitCode::SUCCESS,
+        _ => {
+            terminal::complain(format!("meniscus: {e}"));
+            let no_device = matches!(
+                e.downcast_ref(),
+                Some(HostError::NoDevice { .. } | HostError::NoDriver { .. } | HostError::Loader(_))
+            );
+            ExitCode::from(if no_device { 3 } else { 1 })
+        }
+    })
+}
+
+fn run() -> Result<ExitCode, Box<dyn Error>> {
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(e) => return help(e),
+    };
+    temporary::clean_up_on_signals()?;
+    match command {
         Command::Render(args) => render::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Info => info::run(),
-    };
-    match result {
-        Ok(code) => code,
-        Err(e) => {
-            eprintln!("meniscus: {e}");
-            let no_device = matches!(e.downcast_ref(), Some(HostError::NoDevice { .. } | HostError::Loader(_)));
-            ExitCode::from(if no_device { 3 } else { 1 })
+    }
+}
+
+/// Names the device in errors that are its own.
+fn on(device: &DeviceInfo) -> impl Fn(Box<dyn Error>) -> Box<dyn Error> + use<> {
+    use meniscus::Error as Renderer;
+    let name = format!("device {} ({})", device.name, device.driver);
+    move |e| match e.downcast_ref() {
+        Some(
+            HostError::Vulkan(..)
+            | HostError::Memory(_)
+            | HostError::Renderer(Renderer::Vulkan { .. } | Renderer::Memory { .. } | Renderer::MemoryShort { .. }),
+        ) => format!("{name}: {e}").into(),
+        _ => e,
+    }
+}
+
+/// Shows what clap has to say: help, or what was wrong with the command line.
+fn help(mut said: clap::Error) -> Result<ExitCode, Box<dyn Error>> {
+    // Arguments as they can be shown, before they are taken apart into lines.
+    let given: Vec<_> = said.context().map(|(kind, value)| (kind, value.clone())).collect();
+    for (kind, value) in given {
+        if let ContextValue::String(text) = value {
+            said.insert(kind, ContextValue::String(terminal::plain(&text)));
         }
     }
+    let wrong = said.use_stderr();
+    for line in said.render().to_string().lines() {
+        if wrong {
+            terminal::complain(line);
+        } else {
+            terminal::line(line)?;
+        }
+    }
+    Ok(ExitCode::from(if wrong { 2 } else { 0 }))
 }

@@ -1,16 +1,16 @@
 //! `meniscus render`.
 
 use crate::{
-    camera::{self, View},
-    dump,
+    dump, empty, on,
+    options::Options,
+    outputs,
     prepared::{self, Prepared},
-    scene::{Prepare, Scene, Source, spinner},
-    stats,
+    scene::{Prepare, Scene, spinner},
+    stats, terminal,
 };
-use clap::ValueEnum;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use meniscus::{
-    Camera, Equirect, Error, FrameInput, Fresnel, Particles, Settings, Weighting,
+    Camera, FrameInput, Particles, Settings,
     host::{Gpu, Instance, Session},
     io::images,
     prepare::Report,
@@ -24,76 +24,15 @@ pub struct Args {
     /// Picture: .png (sRGB, 8 bits) or .exr (linear, float)
     #[arg(short, long)]
     pub output: PathBuf,
-    /// Width and height in pixels
-    #[arg(long, value_name = "WxH", default_value = "1024x768", value_parser = parse_size)]
-    pub size: [u32; 2],
-    /// Eye, in the file's coordinates; chosen to frame the liquid if not given
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
-    pub eye: Option<DVec3>,
-    /// Point to look at; the middle of the liquid if not given
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
-    pub target: Option<DVec3>,
-    /// Up, for the camera and the environment
-    #[arg(long, value_name = "X,Y,Z", default_value = "0,1,0", value_parser = parse_vector, allow_hyphen_values = true)]
-    pub up: DVec3,
-    /// Vertical field of view in degrees
-    #[arg(long, value_name = "DEG", default_value_t = 40.0)]
-    pub fov_y: f32,
-    /// Equirectangular environment map, .hdr, .exr or .png; a procedural sky if not given
-    #[arg(long, value_name = "FILE")]
-    pub env: Option<PathBuf>,
-    /// Surfaces at which light bends: 1, 2 or 4
-    #[arg(long, value_name = "N", default_value_t = 4)]
-    pub refractions: u32,
-    /// Total internal reflections followed
-    #[arg(long, value_name = "N", default_value_t = 4)]
-    pub internal_reflections: u32,
-    /// Reflectance: Schlick's approximation or exact
-    #[arg(long, value_enum, default_value = "schlick")]
-    pub fresnel: FresnelArg,
+    #[command(flatten)]
+    pub options: Options,
     /// Render at a multiple of the size and average
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3))]
     pub supersample: u32,
-    /// Plane-fitting window in pixels of the picture: odd
-    #[arg(long, value_name = "N", default_value_t = 9)]
-    pub window: u32,
-    /// Plane-fitting iterations
-    #[arg(long, value_name = "N", default_value_t = 2)]
-    pub iterations: u32,
-    /// Plane-fitting sigma in particle radii
-    #[arg(long, value_name = "R", default_value_t = 5.3)]
-    pub sigma: f32,
-    /// Plane-fitting weights: difference of depths, or distance of points
-    #[arg(long, value_enum, default_value = "view-dependent")]
-    pub weighting: WeightingArg,
-    /// Particle radius in world units; from the file, or estimated from spacing, if not given
-    #[arg(long, value_name = "R", allow_hyphen_values = true)]
-    pub radius: Option<f64>,
-    /// Particles with less than this share of a filled body's density are splash
-    #[arg(long, value_name = "T")]
-    pub splash_threshold: Option<f32>,
-    /// Drop particles whose position is not finite instead of failing
-    #[arg(long)]
-    pub drop_invalid: bool,
-    /// Absorption per world unit for red, green and blue; a light blue that suits the liquid's size if not given
-    #[arg(long, value_name = "R,G,B", value_parser = parse_vector, allow_hyphen_values = true)]
-    pub absorption: Option<DVec3>,
-    /// Index of refraction
-    #[arg(long, value_name = "N", default_value_t = 1.333)]
-    pub ior: f32,
-    /// Device whose name or driver contains this; the best one if not given
-    #[arg(long, value_name = "NAME")]
-    pub device: Option<String>,
-    /// Where classes and ellipsoids are made
-    #[arg(long, value_enum, default_value = "cpu")]
-    pub prepare: Prepare,
-    /// Draw every particle, also those that others hide
-    #[arg(long)]
-    pub no_culling: bool,
     /// Write timings, memory, counts and parameters as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
-    /// Write every intermediate target as .npy into this folder
+    /// Write every intermediate target as .npy into this folder; an older dump in it is replaced
     #[arg(long, value_name = "DIR")]
     pub dump: Option<PathBuf>,
     /// With --dump and --prepare gpu: also write every particle's neighbours (four bytes of device memory for each)
@@ -104,29 +43,24 @@ pub struct Args {
     pub validate: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-pub enum FresnelArg {
-    Schlick,
-    Exact,
-}
+impl Args {
+    pub fn prepare(&self) -> Prepare {
+        self.options.prepare.unwrap_or(Prepare::Cpu)
+    }
 
-#[derive(Clone, Copy, ValueEnum)]
-pub enum WeightingArg {
-    ViewDependent,
-    Euclidean,
-}
-
-pub fn parse_size(s: &str) -> Result<[u32; 2], String> {
-    let parse = |t: &str| t.parse().map_err(|_| format!("\"{s}\" is not WIDTHxHEIGHT, such as 1024x768"));
-    let (w, h) = s.split_once('x').ok_or_else(|| format!("\"{s}\" is not WIDTHxHEIGHT, such as 1024x768"))?;
-    Ok([parse(w)?, parse(h)?])
-}
-
-fn parse_vector(s: &str) -> Result<DVec3, String> {
-    let parts: Result<Vec<f64>, _> = s.split(',').map(|t| t.trim().parse()).collect();
-    match parts.as_deref() {
-        Ok([x, y, z]) if DVec3::new(*x, *y, *z).is_finite() => Ok(DVec3::new(*x, *y, *z)),
-        _ => Err(format!("\"{s}\" is not three finite numbers, such as 0,1,0")),
+    /// Refuses what cannot be written, before anything is rendered.
+    fn check(&self) -> Result<(), Box<dyn std::error::Error>> {
+        images::check_extension(&self.output)?;
+        let mut outputs = vec![("the picture (--output)", self.output.as_path())];
+        outputs.extend(self.stats.as_deref().map(|p| ("the statistics (--stats)", p)));
+        let mut inputs = Vec::new();
+        inputs.extend(self.file.as_deref().map(|p| ("the particle file", p)));
+        inputs.extend(self.options.env.as_deref().map(|p| ("the environment map (--env)", p)));
+        outputs::check(&outputs, self.dump.as_deref(), &inputs)?;
+        if self.dump_neighbours && !self.prepare().on_device() {
+            return Err("--dump-neighbours lists what the device finds: add --prepare gpu".into());
+        }
+        Ok(())
     }
 }
 
@@ -156,105 +90,64 @@ impl Job<'_> {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
-    images::check_extension(&args.output)?;
-    for path in [Some(&args.output), args.stats.as_ref()].into_iter().flatten() {
-        images::check_folder(path)?;
-    }
-    if args.dump_neighbours && !args.prepare.on_device() {
-        return Err("--dump-neighbours lists what the device finds: add --prepare gpu".into());
-    }
-    let environment = args.env.as_deref().map_or_else(|| Ok(Equirect::procedural_sky()), images::read_environment)?;
+    args.check()?;
+    let environment = args.options.environment(args.supersample)?;
     let instance = Instance::new(args.validate)?;
-    let device = instance.pick(args.device.as_deref())?;
-    let scene = Scene::load(&Source {
-        file: args.file.as_deref(),
-        radius: args.radius,
-        splash_threshold: args.splash_threshold,
-        drop_invalid: args.drop_invalid,
-        prepare: args.prepare,
-    })?;
+    let device = instance.pick(args.options.device.as_deref())?;
+    let scene = args.options.load(args.file.as_deref(), args.prepare())?;
     announce(&scene, &device.name, &device.driver);
     let mut job = plan(args, &scene)?;
-    {
+    let on_device = on(&device);
+    let drawn = (|| {
         let gpu = Gpu::new(&instance, device)?;
         let mut session = Session::new(&gpu, job.size, &environment)?;
         let bar = spinner("rendering");
         let done = render(&mut job, &mut session);
         bar.finish_and_clear();
         session.end();
-        done?;
+        done
+    })();
+    if let Some(why) = drawn.map_err(on_device)? {
+        terminal::complain(format!("meniscus: {why}"));
     }
     let messages = instance.messages();
     for m in &messages {
-        eprintln!("validation: {m}");
+        terminal::complain(format!("validation: {m}"));
     }
-    println!("wrote {}", args.output.display());
+    terminal::progress(format!("wrote {}", args.output.display()));
     Ok(if messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(4) })
 }
 
 fn announce(scene: &Scene, device: &str, driver: &str) {
-    println!("device: {device} ({driver})");
+    terminal::progress(format!("device: {device} ({driver})"));
     if scene.dropped > 0 {
-        println!("dropped: {} particles that are not finite", scene.dropped);
+        terminal::progress(format!("dropped: {} particles that are not finite", scene.dropped));
     }
-    if scene.particles.ellipsoids.is_empty() {
-        println!("particles: none; only the background is rendered");
-    } else if scene.report == Report::default() {
-        let p = &scene.particles;
-        println!(
-            "particles: {}, prepared on the device; radius {} ({})",
-            p.ellipsoids.len(),
-            p.radius,
-            scene.radius_source
-        );
+    let (r, p) = (&scene.report, &scene.particles);
+    let what = if p.ellipsoids.is_empty() {
+        "none; only the background is rendered".to_owned()
+    } else if *r == Report::default() {
+        format!("{}, prepared on the device; radius {} ({})", p.ellipsoids.len(), p.radius, scene.radius_source)
     } else {
-        let (r, p) = (&scene.report, &scene.particles);
-        println!("particles: {} splash, {} body; radius {} ({})", r.splash, r.body, p.radius, scene.radius_source);
-    }
+        format!("{} splash, {} body; radius {} ({})", r.splash, r.body, p.radius, scene.radius_source)
+    };
+    terminal::progress(format!("particles: {what}"));
 }
 
 fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::error::Error>> {
-    let radius = scene.particles.radius;
-    let (low, high) = scene.particles.bounds().unwrap_or((Vec3::splat(-1.0), Vec3::splat(1.0)));
-    let aspect = args.size[0].max(1) as f32 / args.size[1].max(1) as f32;
-    let view = View { eye: args.eye, target: args.target, up: args.up, fov_y_deg: args.fov_y };
-    let (camera, eye) = camera::frame(&view, scene.origin, &scene.particles, aspect, 0.1 * radius)?;
-    let s = args.supersample;
-    let times = |edge: u32| edge.checked_mul(s).ok_or("the size times the supersampling is too large");
-    let widest = (Settings::MAX_WINDOW - 1) / s + 1;
-    if args.window.is_multiple_of(2) || !(3..=widest).contains(&args.window) {
-        let remedy = format!("at --supersample {s} use an odd number of pixels from 3 to {}", (widest - 1) / 2 * 2 + 1);
-        return Err(Error::Parameter { parameter: "window", value: args.window.to_string(), remedy }.into());
-    }
-    let settings = Settings {
-        refractions: args.refractions,
-        internal_reflections: args.internal_reflections,
-        fresnel: match args.fresnel {
-            FresnelArg::Schlick => Fresnel::Schlick,
-            FresnelArg::Exact => Fresnel::Exact,
-        },
-        ior: args.ior,
-        absorption: args
-            .absorption
-            .map_or(Vec3::new(1.0, 0.35, 0.2) * (1.2 / (high - low).as_dvec3().length()) as f32, |a| a.as_vec3()),
-        // The window covers the same part of the picture at any supersampling.
-        window: (args.window - 1) * s + 1,
-        iterations: args.iterations,
-        sigma: args.sigma,
-        weighting: match args.weighting {
-            WeightingArg::ViewDependent => Weighting::ViewDependent,
-            WeightingArg::Euclidean => Weighting::Euclidean,
-        },
-        occlusion_culling: !args.no_culling,
-        ..Settings::default()
+    let options = &args.options;
+    let (camera, eye) = options.camera(scene)?;
+    let settings = options.settings(&scene.particles, args.supersample)?;
+    let times = |edge: u32| {
+        edge.checked_mul(args.supersample).ok_or("--size times --supersample is too large: use a smaller one of them")
     };
-    settings.validate()?;
-    let size = [times(args.size[0])?, times(args.size[1])?];
+    let size = [times(options.size[0])?, times(options.size[1])?];
     Ok(Job { args, scene, prepared: None, camera, eye, settings, size, eye_inside: scene.inside(eye) })
 }
 
-fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error::Error>> {
-    let upload = job.scene.give(job.args.prepare, session)?;
+/// Renders and writes everything; says so if the picture shows none of the liquid.
+fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dyn std::error::Error>> {
+    let upload = job.scene.give(job.args.prepare(), session)?;
     let (camera, settings) = (job.camera, job.settings);
     let mut input = FrameInput {
         eye_inside: job.eye_inside,
@@ -268,9 +161,11 @@ fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error
         times = session.frame(&input)?;
     }
     let picture = average(&session.picture()?, job.size, job.args.supersample);
-    images::write_picture(&job.args.output, job.args.size, &picture)?;
+    let output = &job.args.output;
+    outputs::write(output, &images::encode_picture(output, job.args.options.size, &picture)?)?;
+    let no_liquid = empty::explain(session, &job.scene.particles, &camera, &settings, job.size)?;
     if job.args.dump.is_none() && job.args.stats.is_none() {
-        return Ok(());
+        return Ok(no_liquid);
     }
     let memory = session.renderer.memory();
     input.debug = true;
@@ -284,7 +179,7 @@ fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error
             session.frame(&input)?;
         }
     }
-    if job.args.prepare.on_device() {
+    if job.args.prepare().on_device() {
         job.prepared = Some(prepared::read(session, job.scene.particles.radius)?);
     }
     if let Some(folder) = &job.args.dump {
@@ -293,7 +188,7 @@ fn render(job: &mut Job, session: &mut Session) -> Result<(), Box<dyn std::error
     if let Some(path) = &job.args.stats {
         stats::write(path, job, session, times.as_ref(), &memory)?;
     }
-    Ok(())
+    Ok(no_liquid)
 }
 
 /// Mean of each n x n block, in linear light.

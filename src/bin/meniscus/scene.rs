@@ -1,14 +1,18 @@
 //! From a particle file to particles as drawn.
 
+use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
     Class, Ellipsoid, Particles,
     host::{Session, Upload},
-    io::particles::{Invalid, check_finite, read},
+    io::{
+        Budget,
+        particles::{Invalid, check_finite, read_bytes, read_within},
+    },
     prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
 };
-use std::{error::Error, io::Write, path::Path, time::Duration};
+use std::{error::Error, path::Path, time::Duration};
 
 /// The dam break that is rendered when no file is named; see assets/README.md.
 const EMBEDDED: &[u8] = include_bytes!("../../../assets/dam_break.bgeo");
@@ -33,13 +37,14 @@ pub struct Scene {
 pub struct Source<'a> {
     pub file: Option<&'a Path>,
     pub radius: Option<f64>,
-    pub splash_threshold: Option<f32>,
+    pub splash_threshold: f32,
     pub drop_invalid: bool,
+    pub budget: Budget,
     pub prepare: Prepare,
 }
 
 /// Where classes and ellipsoids are made.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, clap::ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Prepare {
     /// On the CPU, before the frame.
     Cpu,
@@ -54,6 +59,11 @@ impl Prepare {
         self != Prepare::Cpu
     }
 
+    /// As the command line calls it.
+    pub fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned())
+    }
+
     fn search(self) -> Search {
         if self == Prepare::GpuRelation { Search::Relation } else { Search::Runs }
     }
@@ -62,16 +72,11 @@ impl Prepare {
 impl Scene {
     pub fn load(source: &Source) -> Result<Scene, Box<dyn Error>> {
         let bar = spinner("reading particles");
-        let embedded;
-        let path = match source.file {
-            Some(path) => path,
-            None => {
-                embedded = tempfile::Builder::new().suffix(".bgeo").tempfile()?;
-                embedded.as_file().write_all(EMBEDDED)?;
-                embedded.path()
-            }
+        let path = source.file.unwrap_or(Path::new("embedded dam_break.bgeo"));
+        let mut file = match source.file {
+            Some(path) => read_within(path, &source.budget)?,
+            None => read_bytes(path, EMBEDDED, &source.budget)?,
         };
-        let mut file = read(path)?;
         let policy = if source.drop_invalid { Invalid::Drop } else { Invalid::Reject };
         let dropped = check_finite(&mut file, policy, path)?;
         bar.finish_and_clear();
@@ -103,16 +108,15 @@ impl Scene {
         let axes: Option<Vec<Mat3>> = file.axes.as_ref().map(|a| a.iter().map(|m| m.as_mat3()).collect());
         let options = Options {
             support: file.support.map(|s| s as f32),
-            splash_threshold: source.splash_threshold.unwrap_or(Options::default().splash_threshold),
+            splash_threshold: source.splash_threshold,
             search: source.prepare.search(),
             ..Options::default()
         };
         if source.prepare.on_device() && (classes.is_some() || axes.is_some()) {
-            return Err(format!(
-                "{} brings classes or ellipsoids of its own, and --prepare gpu makes them anew: use --prepare cpu",
-                path.display()
-            )
-            .into());
+            return Err(
+                "it brings classes or ellipsoids of its own, and --prepare gpu makes them anew: use --prepare cpu"
+                    .into(),
+            );
         }
         let input = Input {
             positions: &positions,

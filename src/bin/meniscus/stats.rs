@@ -1,9 +1,8 @@
 //! `--stats`: timings, memory, counts, and everything needed to repeat the run.
 
-use crate::{codes, dump, render::Job};
+use crate::{codes, dump, outputs, render::Job};
 use meniscus::{
     host::Session,
-    io::images::write_file,
     profile::FrameTimes,
     targets::{Id, LedgerEntry},
 };
@@ -47,7 +46,7 @@ pub fn write(
         "meniscus": env!("CARGO_PKG_VERSION"),
         "device": {"name": info.name, "driver": info.driver, "kind": info.kind, "vulkan": info.api},
         "particles": {"splash": r.splash, "body": r.body, "dropped": job.scene.dropped, "radius_source": job.scene.radius_source},
-        "prepare": format!("{:?}", job.args.prepare).to_lowercase(),
+        "prepare": job.args.prepare().name(),
         "prepare_cpu_ms": job.scene.prepare_ms,
         "gpu": gpu,
         "gpu_protocol": "second frame after start, by timestamps; validation makes times meaningless",
@@ -60,6 +59,6 @@ pub fn write(
         "barriers": session.renderer.plan().iter().filter(|b| b.pass != "copy").map(|b| b.to_string()).collect::<Vec<_>>(),
         "frame": dump::frame(job),
     });
-    write_file(path, serde_json::to_string_pretty(&stats)?.as_bytes())?;
+    outputs::write(path, serde_json::to_string_pretty(&stats)?.as_bytes())?;
     Ok(())
 }

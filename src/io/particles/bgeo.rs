@@ -1,68 +1,160 @@
-//! BGEO files (`.bgeo`), by splashsurf_lib.
+//! BGEO files (`.bgeo`), classic version 5: big-endian; points come first, primitives and the rest are not looked at.
+//!
+//! Own code: the one crate that reads BGEO panics on vectors of floats or integers, which Partio writes.
 
-use std::io::Read;
+use std::io::{BufReader, Read};
 
-use flate2::bufread::GzDecoder;
-use splashsurf_lib::io::bgeo_format::{AttributeStorage, load_bgeo_file};
+use flate2::bufread::MultiGzDecoder;
+use glam::DVec3;
 
-use super::{At, ParticleFile, ReadError, Source, points};
+use super::source::Source;
+use super::{At, ParticleFile, ReadError};
+use crate::io::budget::Metered;
+use crate::io::quote::quote;
 
-/// The header before the attribute definitions.
-const HEADER: usize = 41;
+/// Words of 4 bytes of x, y, z and the weight, which every point has.
+const POSITION: usize = 4;
+/// A point's record is at most so long: far more attributes than any writer makes.
+const WORDS: usize = 1 << 16;
 
 /// Reads the positions and the integer attribute `class`.
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let unpacked;
-    let bytes = if source.bytes.starts_with(&[0x1f, 0x8b]) {
-        let mut buffer = Vec::new();
-        let result = GzDecoder::new(source.bytes).read_to_end(&mut buffer);
-        result.map_err(|error| source.malformed(At::Unknown, format!("gzip: {error}")))?;
-        unpacked = buffer;
-        &unpacked[..]
-    } else {
-        source.bytes
+    if source.bytes.starts_with(&[0x1f, 0x8b]) {
+        let inner = MultiGzDecoder::new(source.bytes);
+        let mut stream = BufReader::new(Metered { inner, ledger: source.ledger, what: "the unpacked gzip stream" });
+        let file = read_points(source, &mut stream, None)?;
+        // gzip's checksum is at its end.
+        std::io::copy(&mut stream, &mut std::io::sink()).map_err(|error| source.broken("gzip", error))?;
+        return Ok(file);
+    }
+    read_points(source, &mut &source.bytes[..], Some(source.bytes.len()))
+}
+
+/// `length` is that of the whole stream, if it is known.
+fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<usize>) -> Result<ParticleFile, ReadError> {
+    let broken = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::UnexpectedEof => source.malformed(At::Unknown, "the file ends within its points"),
+        _ => source.broken("gzip", error),
     };
-    if !bytes.starts_with(b"Bgeo") {
+    if take(stream).map_err(broken)? != *b"Bgeo" {
         return Err(source.malformed_but(
             At::Byte(0),
             "`Bgeo` expected",
             "export it as classic BGEO (version 5), as Partio and SPlisHSPlasH do",
         ));
     }
-    if promised_size(bytes).is_none_or(|size| size > bytes.len()) {
-        return Err(
-            source.malformed(At::Unknown, format!("the header promises more than the {} bytes there are", bytes.len()))
-        );
+    let [version_char] = take(stream).map_err(broken)?;
+    let version = int(stream).map_err(broken)?;
+    if (version_char, version) != (b'V', 5) {
+        let detail = format!("BGEO version {version}, and only 5 is known");
+        return Err(source.malformed_but(At::Byte(4), detail, "export it as classic BGEO (version 5)"));
     }
-    let file = load_bgeo_file(source.path).map_err(|error| source.malformed(At::Unknown, format!("{error:#}")))?;
-    let AttributeStorage::Vector(3, coordinates) = &file.positions else {
-        return Err(source.wrong_shape("position", "no vector of 3", "a vector of 3"));
-    };
-    let coordinates: Vec<f64> = coordinates.iter().map(|v| f64::from(*v)).collect();
-    let class = file.attribute_data.iter().find(|(name, _)| name == "class");
-    let classes = class.map(|(_, storage)| match storage {
-        AttributeStorage::Int(values) => source.classes(&values.iter().map(|v| f64::from(*v)).collect::<Vec<_>>()),
-        _ => Err(source.wrong_shape("class", "not of integers", "one integer for each particle")),
-    });
-    Ok(ParticleFile { positions: points(&coordinates), classes: classes.transpose()?, ..ParticleFile::default() })
+    // Points, primitives, groups of points and of primitives, attributes of points, vertices, primitives, of the whole.
+    let mut counts = [0; 8];
+    for count in &mut counts {
+        *count = int(stream).map_err(broken)?;
+    }
+    let negative = || source.malformed(At::Byte(9), "a count in the header is negative");
+    let points = usize::try_from(counts[0]).map_err(|_| negative())?;
+    let attributes = usize::try_from(counts[4]).map_err(|_| negative())?;
+    let layout = Layout::read(source, stream, attributes, broken)?;
+    let needed = (points as u64) * 4 * layout.words as u64;
+    if let Some(length) = length.filter(|length| needed > *length as u64) {
+        let detail = format!("the header promises {points} points, {needed} bytes; the file has {length}");
+        return Err(source.malformed(At::Byte(9), detail));
+    }
+    let mut positions = source.room(points as u64, "positions")?;
+    let mut classes = source.room(if layout.class.is_some() { points as u64 } else { 0 }, "classes")?;
+    let mut record = vec![0; 4 * layout.words];
+    for index in 0..points {
+        stream.read_exact(&mut record).map_err(broken)?;
+        let words = record.as_chunks().0;
+        positions.push(DVec3::from_array([0, 1, 2].map(|axis| f32::from_be_bytes(words[axis]).into())));
+        if let Some(class) = layout.class {
+            classes.push(source.class(i32::from_be_bytes(words[class]).into(), index)?);
+        }
+    }
+    Ok(ParticleFile { positions, classes: layout.class.map(|_| classes), ..ParticleFile::default() })
 }
 
-/// The bytes that header and points take at least. splashsurf_lib allocates by the header alone (and panics on a short
-/// file), so its sums are done here first. `None` if the attribute definitions run past the end.
-fn promised_size(bytes: &[u8]) -> Option<usize> {
-    let be = |at: usize, length: usize| {
-        Some(bytes.get(at..at.checked_add(length)?)?.iter().fold(0, |v, b| v << 8 | usize::from(*b)))
-    };
-    // Negative counts come out huge, and so too large.
-    let (points, attributes) = (be(9, 4)?, be(25, 4)?);
-    // x, y, z and a weight, 4 bytes each.
-    let (mut at, mut stride) = (HEADER, 16_usize);
-    for _ in 0..attributes {
-        let name = be(at, 2)?;
-        let size = be(at + 2 + name, 2)?;
-        // Name, size, type, and a default value for each component.
-        at += 2 + name + 2 + 4 + 4 * size;
-        stride += 4 * size;
+/// Where a point's record has what.
+struct Layout {
+    words: usize,
+    class: Option<usize>,
+}
+
+impl Layout {
+    /// Reads the definitions of the points' attributes.
+    fn read(
+        source: &Source<'_>,
+        stream: &mut impl Read,
+        attributes: usize,
+        broken: impl Fn(std::io::Error) -> ReadError,
+    ) -> Result<Layout, ReadError> {
+        let mut layout = Layout { words: POSITION, class: None };
+        for _ in 0..attributes {
+            let name = text(stream).map_err(&broken)?;
+            let size = usize::from(short(stream).map_err(&broken)?);
+            let kind = int(stream).map_err(&broken)?;
+            match kind {
+                // FLOAT, INT and VECTOR of any size have a default value for each component.
+                0 | 1 | 5 => skip(stream, 4 * size as u64).map_err(&broken)?,
+                // INDEX has the strings that points refer to.
+                4 => {
+                    for _ in 0..int(stream).map_err(&broken)?.max(0) {
+                        let length = short(stream).map_err(&broken)?;
+                        skip(stream, length.into()).map_err(&broken)?;
+                    }
+                }
+                _ => {
+                    let detail = format!("attribute `{}` has the unknown type {kind}", quote(&name));
+                    return Err(source.malformed_but(At::Unknown, detail, "remove the attribute and export again"));
+                }
+            }
+            if name == "class" {
+                if (kind, size) != (1, 1) {
+                    return Err(source.wrong_shape(
+                        "class",
+                        format!("of type {kind} and size {size}"),
+                        "one integer (type 1) for each particle",
+                    ));
+                }
+                if layout.class.replace(layout.words).is_some() {
+                    return Err(source.malformed(At::Unknown, "attribute `class` is there twice"));
+                }
+            }
+            layout.words += size;
+            if layout.words > WORDS {
+                return Err(source.malformed(At::Unknown, format!("a point has more than {WORDS} numbers")));
+            }
+        }
+        Ok(layout)
     }
-    points.checked_mul(stride)?.checked_add(at)
+}
+
+fn take<const N: usize>(stream: &mut impl Read) -> std::io::Result<[u8; N]> {
+    let mut bytes = [0; N];
+    stream.read_exact(&mut bytes)?;
+    Ok(bytes)
+}
+
+fn int(stream: &mut impl Read) -> std::io::Result<i32> {
+    take(stream).map(i32::from_be_bytes)
+}
+
+fn short(stream: &mut impl Read) -> std::io::Result<u16> {
+    take(stream).map(u16::from_be_bytes)
+}
+
+fn text(stream: &mut impl Read) -> std::io::Result<String> {
+    let mut name = vec![0; short(stream)?.into()];
+    stream.read_exact(&mut name)?;
+    Ok(String::from_utf8_lossy(&name).into_owned())
+}
+
+fn skip(stream: &mut impl Read, length: u64) -> std::io::Result<()> {
+    match std::io::copy(&mut stream.take(length), &mut std::io::sink())? {
+        skipped if skipped == length => Ok(()),
+        _ => Err(std::io::ErrorKind::UnexpectedEof.into()),
+    }
 }

@@ -1,149 +1,216 @@
-//! NumPy arrays and archives (`.npy`, `.npz`), by npyz.
+//! NumPy arrays and archives (`.npy`, `.npz`): the archives by npyz.
 
 use std::io::{Cursor, Read};
 
 use glam::{DMat3, DVec3};
 use npyz::npz::NpzArchive;
-use npyz::{DType, Deserialize, NpyFile, NpyHeader, TypeChar};
 
-use super::{At, ParticleFile, ReadError, Source};
+use super::numbers::Decoder;
+use super::numpy_header::{self, Header};
+use super::source::{Source, find};
+use super::{At, ParticleFile, ReadError};
+use crate::io::budget::Metered;
+use crate::io::quote::list;
 
 /// Names of the array of positions in an archive, the first that is there counts.
 const POSITIONS: [&str; 6] = ["position", "positions", "pos", "center", "centers", "points"];
 
+/// Bytes of the end of a zip directory without its comment, and of the 64-bit end's locator.
+const END: usize = 22;
+const LOCATOR: usize = 20;
+/// Bytes that an entry of a zip directory takes at least.
+const LEAST_ENTRY: u64 = 46;
+
+/// Bytes that are decoded at a time.
+const PART: usize = 1 << 16;
+
 /// Reads an array N x 3.
 pub(super) fn read_npy(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let positions = Array::parse(source, "array", source.bytes)?.positions(source)?;
+    let mut rest = source.bytes;
+    let positions = Array::open(source, "array", &mut rest)?.positions(source)?;
+    if !rest.is_empty() {
+        let at = At::Byte((source.bytes.len() - rest.len()) as u64);
+        return Err(source.malformed(at, format!("{} bytes after the array's end", rest.len())));
+    }
     Ok(ParticleFile { positions, ..ParticleFile::default() })
 }
 
 /// Reads the arrays this crate knows of an archive, compressed or not.
 pub(super) fn read_npz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let broken = |error: std::io::Error| source.malformed(At::Unknown, format!("archive: {error}"));
+    check_directory(source)?;
+    let broken = |error: std::io::Error| source.broken("archive", error);
     let mut archive = NpzArchive::new(Cursor::new(source.bytes)).map_err(broken)?;
-    let names: Vec<String> = archive.array_names().map(str::to_owned).collect();
-    let mut array = |name: &str| -> Result<Option<Array>, ReadError> {
-        if !names.iter().any(|known| known == name) {
-            return Ok(None);
-        }
-        let mut bytes = Vec::new();
-        let entry = archive.zip_archive().by_name(&format!("{name}.npy"));
-        let read = entry.map_err(std::io::Error::other).and_then(|mut entry| entry.read_to_end(&mut bytes));
-        read.map_err(|error| source.malformed(At::Unknown, format!("array `{name}`: {error}")))?;
-        Array::parse(source, name, &bytes).map(Some)
+    let mut names: Vec<String> = archive.array_names().map(str::to_owned).collect();
+    names.sort_unstable();
+    let zip = archive.zip_archive();
+    if zip.len() != zip.file_names().count() {
+        return Err(source.malformed(At::Unknown, "archive: two arrays have the same name"));
+    }
+    let Some(position) = POSITIONS.iter().find(|name| names.iter().any(|known| known == *name)) else {
+        let found = format!("arrays {}", list(names.iter().map(String::as_str)));
+        return Err(source.no_positions("an array named `position` or `points` expected", found));
     };
-    let Some(name) = POSITIONS.iter().find(|name| names.iter().any(|known| known == *name)) else {
-        let mut found = names.clone();
-        found.sort();
-        return Err(source
-            .no_positions("an array named `position` or `points` expected", format!("arrays {}", found.join(", "))));
+    let positions = entry(source, &mut archive, &names, position, |array| array.positions(source))?.unwrap_or_default();
+    let mut length = |name: &str| match entry(source, &mut archive, &names, name, |array| array.numbers(source))? {
+        Some(values) => source.length(name, values),
+        None => Ok(None),
     };
-    let positions = array(name)?.map(|array| array.positions(source)).transpose()?.unwrap_or_default();
-    let mut length = |name: &str| array(name)?.map_or(Ok(None), |array| source.length(name, array.values));
     let (radius, support) = (length("radius")?, length("support")?);
-    let classes = array("class")?.map(|array| array.classes(source)).transpose()?;
-    let axes = array("axes")?.map(|array| array.axes(source)).transpose()?;
+    let classes = entry(source, &mut archive, &names, "class", |array| array.classes(source))?;
+    let axes = entry(source, &mut archive, &names, "axes", |array| array.axes(source))?;
     Ok(ParticleFile { positions, radius, support, classes, axes })
 }
 
-/// An array of numbers of any type and order.
-struct Array {
-    name: String,
-    shape: Vec<usize>,
-    /// For each dimension the distance of neighbours in `values`; this is how Fortran order differs.
-    strides: Vec<usize>,
-    values: Vec<f64>,
+/// What `read` makes of the array `name`, if the archive has it. Nothing is unpacked that is not decoded at once.
+fn entry<T>(
+    source: &Source<'_>,
+    archive: &mut NpzArchive<Cursor<&[u8]>>,
+    names: &[String],
+    name: &str,
+    read: impl FnOnce(Array<'_>) -> Result<T, ReadError>,
+) -> Result<Option<T>, ReadError> {
+    if !names.iter().any(|known| known == name) {
+        return Ok(None);
+    }
+    let what = format!("array `{name}`");
+    let entry = archive.zip_archive().by_name(&format!("{name}.npy"));
+    let inner = entry.map_err(|error| source.broken(&what, std::io::Error::other(error)))?;
+    let mut stream = Metered { inner, ledger: source.ledger, what: &what };
+    let value = read(Array::open(source, name, &mut stream)?)?;
+    // The archive's checksum is looked at where the entry ends.
+    match std::io::copy(&mut stream, &mut std::io::sink()) {
+        Ok(0) => Ok(Some(value)),
+        Ok(rest) => Err(source.malformed(At::Unknown, format!("{what}: {rest} bytes after its end"))),
+        Err(error) => Err(source.broken(&what, error)),
+    }
 }
 
-impl Array {
-    fn parse(source: &Source<'_>, name: &str, bytes: &[u8]) -> Result<Self, ReadError> {
-        let broken =
-            |detail: &dyn std::fmt::Display| source.malformed(At::Unknown, format!("array `{name}`: {detail}"));
-        check_header(bytes).map_err(|detail| broken(&detail))?;
-        let mut rest = bytes;
-        let header = NpyHeader::from_reader(&mut rest).map_err(|error| broken(&error))?;
-        let DType::Plain(data_type) = header.dtype() else {
-            return Err(source.wrong_shape(name, "of records", "of numbers"));
-        };
-        let (shape, strides) = (header.shape().to_vec(), header.strides().to_vec());
-        let size = shape.iter().try_fold(data_type.size_field(), |size, n| size.checked_mul(*n));
-        if size.is_none_or(|size| size > rest.len() as u64) {
-            return Err(broken(&format!(
-                "shape {shape:?} of `{data_type}` does not fit in the {} bytes of data",
-                rest.len()
-            )));
+/// The zip crate allocates for as many entries as the end of the directory promises; 64 bits can promise too many.
+fn check_directory(source: &Source<'_>) -> Result<(), ReadError> {
+    let bytes = source.bytes;
+    // The end of the directory, before a comment; a locator before it, if there is a 64-bit end somewhere before that.
+    let tail = bytes.len().saturating_sub(END + usize::from(u16::MAX));
+    let end = bytes[tail..].windows(4).rposition(|window| window == b"PK\x05\x06").map(|at| tail + at);
+    let locator =
+        end.and_then(|end| bytes.get(end.checked_sub(LOCATOR)?..end)).filter(|l| l.starts_with(b"PK\x06\x07"));
+    let promised = locator.and_then(|locator| {
+        let nominal = usize::try_from(u64::from_le_bytes(locator[8..16].try_into().ok()?)).ok()?;
+        let from = bytes.get(nominal..)?;
+        let end = &from[find(from, b"PK\x06\x06")?..];
+        Some(u64::from_le_bytes(end.get(32..40)?.try_into().ok()?))
+    });
+    match promised {
+        Some(promised) if promised > bytes.len() as u64 / LEAST_ENTRY => {
+            let detail = format!("archive: it promises {promised} arrays, and is too short for them");
+            Err(source.malformed(At::Unknown, detail))
         }
-        let file = NpyFile::with_header(header, rest);
-        let values = match (data_type.type_char(), data_type.size_field()) {
-            (TypeChar::Float, 4) => values(file, |v: f32| v.into()),
-            (TypeChar::Float, 8) => values(file, |v: f64| v),
-            (TypeChar::Int, 1) => values(file, |v: i8| v.into()),
-            (TypeChar::Int, 2) => values(file, |v: i16| v.into()),
-            (TypeChar::Int, 4) => values(file, |v: i32| v.into()),
-            (TypeChar::Int, 8) => values(file, |v: i64| v as f64),
-            (TypeChar::Uint, 1) => values(file, |v: u8| v.into()),
-            (TypeChar::Uint, 2) => values(file, |v: u16| v.into()),
-            (TypeChar::Uint, 4) => values(file, |v: u32| v.into()),
-            (TypeChar::Uint, 8) => values(file, |v: u64| v as f64),
-            (TypeChar::Bool, _) => values(file, |v: bool| u8::from(v).into()),
-            _ => {
-                return Err(source.wrong_shape(name, format!("of type `{data_type}`"), "float32, float64 or integers"));
-            }
-        };
-        let to_usize = |values: Vec<u64>| values.into_iter().map(|v| v as usize).collect();
-        Ok(Array {
-            name: name.into(),
-            shape: to_usize(shape),
-            strides: to_usize(strides),
-            values: values.map_err(|error| broken(&error))?,
-        })
+        _ => Ok(()),
+    }
+}
+
+/// An array of numbers of any type and order, of which the header is read.
+struct Array<'a> {
+    name: &'a str,
+    header: Header,
+    stream: &'a mut dyn Read,
+}
+
+impl<'a> Array<'a> {
+    fn open(source: &Source<'_>, name: &'a str, stream: &'a mut dyn Read) -> Result<Self, ReadError> {
+        Ok(Array { name, header: numpy_header::read(source, name, stream)?, stream })
     }
 
     fn wrong_shape(&self, source: &Source<'_>, expected: &'static str) -> ReadError {
-        source.wrong_shape(&self.name, format!("of shape {:?}", self.shape), expected)
+        source.wrong_shape(self.name, format!("of shape {:?}", self.header.shape), expected)
     }
 
-    fn positions(&self, source: &Source<'_>) -> Result<Vec<DVec3>, ReadError> {
-        let ([n, 3], [row, column]) = (&self.shape[..], &self.strides[..]) else {
+    fn positions(self, source: &Source<'_>) -> Result<Vec<DVec3>, ReadError> {
+        let [n, 3] = self.header.shape[..] else {
             return Err(self.wrong_shape(source, "N x 3"));
         };
-        let at = |i: usize, j: usize| self.values[i * row + j * column];
-        Ok((0..*n).map(|i| DVec3::new(at(i, 0), at(i, 1), at(i, 2))).collect())
+        let (mut positions, rows) = (self.filled(source, n, DVec3::ZERO)?, n as usize);
+        let fortran = self.header.fortran;
+        self.read(source, 3 * rows, |i, v| {
+            let (row, axis) = if fortran { (i % rows, i / rows) } else { (i / 3, i % 3) };
+            positions[row][axis] = v;
+            Ok(())
+        })?;
+        Ok(positions)
     }
 
-    fn classes(&self, source: &Source<'_>) -> Result<Vec<u8>, ReadError> {
-        match self.shape[..] {
-            [_] | [_, 1] => source.classes(&self.values),
-            _ => Err(self.wrong_shape(source, "N integers")),
-        }
+    fn classes(self, source: &Source<'_>) -> Result<Vec<u8>, ReadError> {
+        let ([n] | [n, 1]) = self.header.shape[..] else {
+            return Err(self.wrong_shape(source, "N integers"));
+        };
+        let mut classes = self.filled(source, n, 0_u8)?;
+        self.read(source, n as usize, |i, v| source.class(v, i).map(|class| classes[i] = class))?;
+        Ok(classes)
     }
 
-    fn axes(&self, source: &Source<'_>) -> Result<Vec<DMat3>, ReadError> {
-        let ([n, 3, 3], [matrix, row, column]) = (&self.shape[..], &self.strides[..]) else {
+    fn axes(self, source: &Source<'_>) -> Result<Vec<DMat3>, ReadError> {
+        let [n, 3, 3] = self.header.shape[..] else {
             return Err(self.wrong_shape(source, "N x 3 x 3"));
         };
-        let axis =
-            |i: usize, k: usize| DVec3::from_array([0, 1, 2].map(|c| self.values[i * matrix + k * row + c * column]));
-        Ok((0..*n).map(|i| DMat3::from_cols(axis(i, 0), axis(i, 1), axis(i, 2))).collect())
+        let (mut axes, rows) = (self.filled(source, n, DMat3::ZERO)?, n as usize);
+        let fortran = self.header.fortran;
+        self.read(source, 9 * rows, |i, v| {
+            let (matrix, row, column) =
+                if fortran { (i % rows, i / rows % 3, i / (3 * rows)) } else { (i / 9, i / 3 % 3, i % 3) };
+            // A row of the file's matrix is a column here.
+            axes[matrix].col_mut(row)[column] = v;
+            Ok(())
+        })?;
+        Ok(axes)
     }
-}
 
-fn values<T: Deserialize>(file: NpyFile<&[u8]>, to_f64: impl Fn(T) -> f64) -> std::io::Result<Vec<f64>> {
-    Ok(file.into_vec::<T>()?.into_iter().map(to_f64).collect())
-}
+    /// All values, whatever the shape.
+    fn numbers(self, source: &Source<'_>) -> Result<Vec<f64>, ReadError> {
+        let n = self.header.shape.iter().try_fold(1_u64, |n, d| n.checked_mul(*d)).unwrap_or(u64::MAX);
+        let mut values = self.filled(source, n, 0.0)?;
+        self.read(source, n as usize, |i, v| {
+            values[i] = v;
+            Ok(())
+        })?;
+        Ok(values)
+    }
 
-/// npyz allocates what a header says of its own length, and its parser recurses as deep as the brackets in it.
-fn check_header(bytes: &[u8]) -> Result<(), String> {
-    let text = match bytes {
-        [0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, a, b, text @ ..] => text.get(..u16::from_le_bytes([*a, *b]).into()),
-        [0x93, b'N', b'U', b'M', b'P', b'Y', 2 | 3, _, a, b, c, d, text @ ..] => {
-            text.get(..u32::from_le_bytes([*a, *b, *c, *d]) as usize)
+    /// `n` times `value`, to be overwritten.
+    fn filled<T: Clone>(&self, source: &Source<'_>, n: u64, value: T) -> Result<Vec<T>, ReadError> {
+        let mut list = source.room(n, &format!("array `{}`", self.name))?;
+        list.resize(n as usize, value);
+        Ok(list)
+    }
+
+    /// Calls `each` with index and value of all `count` values in the order of the file.
+    fn read(
+        self,
+        source: &Source<'_>,
+        count: usize,
+        mut each: impl FnMut(usize, f64) -> Result<(), ReadError>,
+    ) -> Result<(), ReadError> {
+        let Array { name, header, stream } = self;
+        let mut decoder = Decoder::new(header.kind, header.big_endian);
+        let mut stream = stream.take((count * header.kind.size()) as u64);
+        let mut part = vec![0; PART];
+        let (mut found, mut first_error) = (0, Ok(()));
+        loop {
+            let length = match stream.read(&mut part) {
+                Ok(0) => break,
+                Ok(length) => length,
+                Err(error) => return Err(source.broken(&format!("array `{name}`"), error)),
+            };
+            decoder.feed(&part[..length], |value| {
+                if first_error.is_ok() {
+                    first_error = each(found, value);
+                }
+                found += 1;
+            });
+            std::mem::replace(&mut first_error, Ok(()))?;
         }
-        _ => return Err("not a NumPy array of format 1 to 3".into()),
-    };
-    let text = text.ok_or("the header is cut off")?;
-    match text.iter().filter(|b| b"([{-+".contains(b)).count() {
-        0..=64 => Ok(()),
-        _ => Err("the header is nested too deep".into()),
+        if found < count {
+            let detail = format!("array `{name}`: {count} values promised, {found} found");
+            return Err(source.malformed(At::Unknown, detail));
+        }
+        Ok(())
     }
 }

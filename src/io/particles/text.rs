@@ -1,122 +1,111 @@
-//! Text tables (`.csv`, `.xyz`) and raw `.xyz`.
+//! What text formats share: encodings, lines, numbers.
 
-use csv::{ReaderBuilder, StringRecord, Trim};
-use glam::DVec3;
+use super::source::Source;
+use super::{At, ReadError};
+use crate::io::quote::quote;
 
-use super::{At, ParticleFile, ReadError, Source, numbers, points};
+/// Bytes at the start of a file by which text is known.
+const HEAD: usize = 1024;
 
-/// Reads little-endian float32 triples; or, if the file starts with printable text, [`text_xyz`].
-pub(super) fn read_xyz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    // Of the bytes of float32 triples hardly half are printable; a text may have a few that are not (an accent, a flaw).
-    let head = &source.bytes[..source.bytes.len().min(1024)];
-    let printable = |b: &&u8| b.is_ascii_graphic() || b.is_ascii_whitespace();
-    if head.iter().filter(printable).count() * 16 >= head.len() * 15 {
-        return text_xyz(source);
+/// Both readers of tables advise this.
+pub(super) const DECIMAL_POINTS: &str = "write decimal points, and no thousands separators";
+
+/// The file without a UTF-8 byte-order mark.
+///
+/// # Errors
+/// [`ReadError::Malformed`] for UTF-16 and UTF-32, which look like packed numbers.
+pub(super) fn content<'a>(source: &Source<'a>) -> Result<&'a [u8], ReadError> {
+    let bytes = source.bytes;
+    let head = &bytes[..bytes.len().min(HEAD)];
+    let wide = |lead: usize| {
+        let (mut pairs, mut text) = (0, 0);
+        for pair in head.chunks_exact(2) {
+            pairs += 1;
+            text += usize::from(pair[1 - lead] == 0 && printable(pair[lead]));
+        }
+        pairs >= 4 && text * 8 >= pairs * 7
+    };
+    let utf32 = [[0xff, 0xfe, 0, 0], [0, 0, 0xfe, 0xff]].iter().any(|mark| bytes.starts_with(mark));
+    if utf32 || wide(0) || wide(1) {
+        return Err(source.malformed_but(At::Byte(0), "it is UTF-16 or UTF-32 text", "save it as UTF-8"));
     }
-    let rest = source.bytes.len() % 12;
-    if rest != 0 {
-        let at = At::Byte((source.bytes.len() - rest) as u64);
-        return Err(source.malformed(at, format!("{rest} bytes left after the last whole float32 triple")));
-    }
-    let values = numbers(source.bytes, "float", false).unwrap_or_default();
-    Ok(ParticleFile { positions: points(&values), ..ParticleFile::default() })
+    Ok(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))
 }
 
-/// Lines `x y z ...` or, as in chemistry, `element x y z ...`, separated by blanks or commas; `#` starts a comment. A first
-/// line with nothing but a count is followed by a comment line, and checked.
-fn text_xyz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let text = String::from_utf8_lossy(source.bytes);
-    let mut lines = text.lines().enumerate().peekable();
-    let blank = |line: &str| line.trim().is_empty() || line.trim_start().starts_with('#');
-    while lines.next_if(|(_, line)| blank(line)).is_some() {}
-    let promised: Option<usize> = lines.peek().and_then(|(_, line)| line.trim().parse().ok());
-    if promised.is_some() {
-        lines.nth(1);
-    }
-    let mut positions = Vec::new();
-    for (index, line) in lines.filter(|(_, line)| !blank(line)) {
-        let at = At::Line(index as u64 + 1);
-        let mut words = line.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty()).peekable();
-        words.next_if(|word| word.parse::<f64>().is_err());
-        let mut number = || {
-            let word = words.next().ok_or_else(|| source.malformed(at, "three numbers expected, fewer found"))?;
-            word.parse::<f64>()
-                .map_err(|_| source.malformed(at, format!("number expected, found `{}`", word.escape_debug())))
-        };
-        positions.push(DVec3::new(number()?, number()?, number()?));
-    }
-    if promised.is_some_and(|promised| promised != positions.len()) {
-        let detail =
-            format!("the first line promises {} positions, {} follow", promised.unwrap_or_default(), positions.len());
-        return Err(source.malformed(At::Line(1), detail));
-    }
-    Ok(ParticleFile { positions, ..ParticleFile::default() })
+/// Whether `bytes` begin as a text does. Of the bytes of packed numbers hardly half are printable; a text may have a few
+/// that are not (an accent, a flaw), or many if they are UTF-8.
+pub(super) fn is_text(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(HEAD)];
+    let plain = head.iter().filter(|b| printable(**b)).count() * 16 >= head.len() * 15;
+    let utf8 = match std::str::from_utf8(head) {
+        Ok(_) => true,
+        // The head may end within a character.
+        Err(error) => error.error_len().is_none(),
+    };
+    plain || (utf8 && head.iter().all(|b| printable(*b) || !b.is_ascii()))
 }
 
-/// Reads columns separated by commas, semicolons or tabs, found by the header's names; without a header the first three.
-pub(super) fn read_csv(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let first_line = source.bytes.split(|b| *b == b'\n').find(|line| !line.starts_with(b"#")).unwrap_or_default();
-    let delimiter = [b',', b';', b'\t'].into_iter().find(|d| first_line.contains(d)).unwrap_or(b',');
-    let mut reader = ReaderBuilder::new()
-        .has_headers(false)
-        .delimiter(delimiter)
-        .comment(Some(b'#'))
-        .trim(Trim::All)
-        .from_reader(source.bytes);
-    let broken = |error: csv::Error| {
-        let at = error.position().map_or(At::Unknown, |position| At::Line(position.line()));
-        source.malformed(at, error.to_string())
-    };
-    let mut records = reader.records();
-    let first = records.next().transpose().map_err(broken)?.unwrap_or_default();
-    let number = |record: &StringRecord, column: usize| -> Result<f64, ReadError> {
-        let text = record.get(column).unwrap_or_default();
-        let at = record.position().map_or(At::Unknown, |position| At::Line(position.line()));
-        text.parse().map_err(|_| {
-            source.malformed(at, format!("number expected in column {}, found `{}`", column + 1, text.escape_debug()))
-        })
-    };
-    let has_header = first.iter().take(3).any(|field| field.parse::<f64>().is_err());
-    let column = |wanted: &dyn Fn(&str) -> bool| first.iter().position(wanted).filter(|_| has_header);
-    let axes = if has_header {
-        [('x', '0'), ('y', '1'), ('z', '2')].map(|(letter, digit)| column(&|name| is_axis(name, letter, digit)))
-    } else {
-        [0, 1, 2].map(|axis| (axis < first.len()).then_some(axis))
-    };
-    let [Some(x), Some(y), Some(z)] = axes else {
-        return Err(source
-            .no_positions("columns x, y, z expected", format!("`{}`", first.iter().collect::<Vec<_>>().join("`, `"))));
-    };
-    let class = column(&|name| name.eq_ignore_ascii_case("class"));
-    let radius = column(&|name| name.eq_ignore_ascii_case("radius"));
-    let (mut positions, mut classes, mut radii) = (Vec::new(), Vec::new(), Vec::new());
-    for record in (!has_header).then(|| Ok(first.clone())).into_iter().chain(records) {
-        let record = record.map_err(broken)?;
-        positions.push(DVec3::new(number(&record, x)?, number(&record, y)?, number(&record, z)?));
-        class.map(|column| number(&record, column).map(|value| classes.push(value))).transpose()?;
-        radius.map(|column| number(&record, column).map(|value| radii.push(value))).transpose()?;
-    }
-    let classes = class.map(|_| source.classes(&classes)).transpose()?;
-    Ok(ParticleFile { positions, radius: source.length("radius", radii)?, classes, ..ParticleFile::default() })
+fn printable(byte: u8) -> bool {
+    byte.is_ascii_graphic() || byte.is_ascii_whitespace()
 }
 
-/// Whether a column named `name` holds positions along an axis: `x`, `Points:0`, `position_x`, `Pos.X`, `px` and the like.
-fn is_axis(name: &str, letter: char, digit: char) -> bool {
-    let name: String = name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
-    let stems = [
-        "p",
-        "pos",
-        "position",
-        "positions",
-        "point",
-        "points",
-        "coord",
-        "coords",
-        "coordinate",
-        "coordinates",
-        "center",
-        "centre",
-    ];
-    name.strip_suffix(letter).is_some_and(|stem| stem.is_empty() || stems.contains(&stem))
-        || name.strip_suffix(digit).is_some_and(|stem| stems.contains(&stem))
+/// The lines of `bytes` with their numbers from 1. A line ends at a line feed, a carriage return, or both.
+pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
+    let (mut rest, mut number) = (Some(bytes), 0);
+    std::iter::from_fn(move || {
+        let bytes = rest?;
+        number += 1;
+        let end = bytes.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(bytes.len());
+        let skip = if bytes[end..].starts_with(b"\r\n") { 2 } else { 1 };
+        rest = bytes.get(end + skip..);
+        Some((number, &bytes[..end]))
+    })
+}
+
+/// How many lines there are, at most.
+pub(super) fn line_count(bytes: &[u8]) -> u64 {
+    bytes.iter().filter(|b| matches!(b, b'\n' | b'\r')).count() as u64 + 1
+}
+
+/// The number `word`, in which a comma can only be a decimal comma or a thousands separator.
+pub(super) fn number(source: &Source<'_>, at: At, word: &str, place: &str) -> Result<f64, ReadError> {
+    word.parse().map_err(|_| {
+        let detail = format!("number expected{place}, found `{}`", quote(word));
+        let digits = |part: &str| part.chars().all(|c| c.is_ascii_digit() || "+-.,eE".contains(c));
+        if word.contains(',') && digits(word) {
+            return source.malformed_but(at, detail, DECIMAL_POINTS);
+        }
+        source.malformed_but(
+            at,
+            detail,
+            "correct it; headings and comments start with # (.xyz, .csv) or are names of columns (.csv)",
+        )
+    })
+}
+
+/// Tells the columns of a file without names of columns: whether all of it could be decimal commas taken for separators.
+///
+/// `0,637,0,270,0,041` has six integers or three decimals. Positions that are all integers, followed by integers, with
+/// nothing but commas between, are rare enough to ask for a header.
+#[derive(Default)]
+pub(super) struct CommaCheck {
+    no_integer: bool,
+}
+
+impl CommaCheck {
+    pub(super) fn field(&mut self, field: &str) {
+        self.no_integer |= !field.is_empty() && field.bytes().any(|b| !b.is_ascii_digit() && !b"+-".contains(&b));
+    }
+
+    pub(super) fn finish(&self, source: &Source<'_>, at: At, columns: usize) -> Result<(), ReadError> {
+        if self.no_integer || columns < 4 {
+            return Ok(());
+        }
+        let detail = format!("{columns} columns of integers, which may as well be fewer with decimal commas");
+        Err(source.malformed_but(
+            at,
+            detail,
+            "write decimal points, or a first line with the names of columns in a .csv",
+        ))
+    }
 }

@@ -1,21 +1,23 @@
 //! Legacy VTK files (`.vtk`).
-//!
-//! vtkio rejects a whole file for parts that do not matter here (a FIELD before POINTS as ParaView writes, ids of type
-//! vtkIdType, nan in ASCII); so POINTS are read directly, and vtkio says whether the rest is whole, and reads `class`.
 
-use std::io::Read;
+use glam::DVec3;
 
-use splashsurf_lib::vtkio::Error;
-use splashsurf_lib::vtkio::model::{Attribute, DataSet, IOBuffer, Piece, Vtk};
-
-use super::{At, ParticleFile, ReadError, Source, find, numbers, points};
+use super::source::{Source, find};
+use super::vtk_sections::Sections;
+use super::{At, ParticleFile, ReadError};
+use crate::io::quote::quote;
 
 /// Reads POINTS and, where there is one, the point array `class`.
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let bytes = source.bytes;
-    let mut lines =
-        bytes.splitn(4, |b| *b == b'\n').map(|line| String::from_utf8_lossy(line).trim().to_ascii_uppercase());
-    let (first, kind) = (lines.next().unwrap_or_default(), lines.nth(1).unwrap_or_default());
+    let bytes = source.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(source.bytes);
+    let mut lines = bytes.splitn(4, |b| *b == b'\n');
+    let mut line = |length: &mut usize| {
+        let line = lines.next().unwrap_or_default();
+        *length += line.len() + 1;
+        String::from_utf8_lossy(line).trim().to_ascii_uppercase()
+    };
+    let mut at = source.bytes.len() - bytes.len();
+    let (first, _title, kind) = (line(&mut at), line(&mut at), line(&mut at));
     if !first.starts_with("# VTK DATAFILE") {
         return Err(source.malformed(At::Line(1), "`# vtk DataFile Version` expected"));
     }
@@ -23,103 +25,207 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     if !ascii && kind != "BINARY" {
         return Err(source.malformed(At::Line(3), "`ASCII` or `BINARY` expected"));
     }
-    let Some(at) = find(bytes, b"\nPOINTS ").map(|at| at + 1) else {
-        let tail = &bytes[find(bytes, b"\nDATASET ").map_or(bytes.len(), |at| at + 9)..];
-        let dataset = String::from_utf8_lossy(tail.split(|b| *b == b'\n').next().unwrap_or_default());
-        return Err(source.no_positions("POINTS expected", format!("data set `{}` without", dataset.trim())));
-    };
-    let line_end = bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |length| at + length);
-    let line = String::from_utf8_lossy(&bytes[at..line_end]);
-    let mut words = line.split_ascii_whitespace().skip(1);
-    let count: usize = words
-        .next()
-        .and_then(|word| word.parse().ok())
-        .ok_or_else(|| source.malformed(At::Byte(at as u64), "POINTS without a count"))?;
-    let data_type = words.next().unwrap_or_default().to_ascii_lowercase();
-    let size = match data_type.as_str() {
-        "float" => 4,
-        "double" => 8,
-        _ => {
-            return Err(source.wrong_shape("POINTS", format!("of type `{data_type}`"), "float or double"));
-        }
-    };
-    let body = bytes.get(line_end + 1..).unwrap_or_default();
-    let wanted = count.saturating_mul(3);
-    let values = if ascii {
-        ascii_values(source, body, wanted)?
-    } else {
-        binary_values(body, wanted.saturating_mul(size), &data_type)
-    };
-    if values.len() != wanted {
-        let detail = format!("POINTS promises {count} positions, and the file holds {}", values.len() / 3);
-        return Err(source.malformed(At::Byte(at as u64), detail));
+    let sections = Sections { source, at: at.min(source.bytes.len()), ascii };
+    Walk {
+        sections,
+        data_set: String::new(),
+        positions: None,
+        classes: None,
+        after_points: false,
+        of: Of::Set,
+        tuples: 0,
     }
-    // Binary data that ends early fails as `Complete`; any other failure is something that vtkio does not know.
-    if let Err(Error::Parse(kind)) = Vtk::parse_legacy_be(bytes)
-        && format!("{kind:?}") == "Complete"
-    {
-        let at = At::Byte(bytes.len() as u64);
-        return Err(source.malformed(at, "the file ends within the data after POINTS"));
-    }
-    Ok(ParticleFile {
-        positions: points(&values),
-        classes: classes(source, line_end, &kind)?,
-        ..ParticleFile::default()
-    })
+    .run()
 }
 
-fn binary_values(body: &[u8], length: usize, data_type: &str) -> Vec<f64> {
-    // A short body decodes to fewer values, which the caller reports.
-    numbers(&body[..length.min(body.len())], data_type, true).unwrap_or_default()
+/// What arrays belong to.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Of {
+    Set,
+    Points,
+    Cells,
 }
 
-fn ascii_values(source: &Source<'_>, body: &[u8], wanted: usize) -> Result<Vec<f64>, ReadError> {
-    let words = body.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).take(wanted);
-    words
-        .map(|word| {
-            let text = String::from_utf8_lossy(word);
-            let at = At::Byte((word.as_ptr().addr() - source.bytes.as_ptr().addr()) as u64);
-            text.parse().map_err(|_| {
-                source.malformed(at, format!("number expected in POINTS, found `{}`", text.escape_debug()))
-            })
-        })
-        .collect()
+/// Goes through a file section by section.
+struct Walk<'a> {
+    sections: Sections<'a>,
+    data_set: String,
+    positions: Option<Vec<DVec3>>,
+    classes: Option<Vec<u8>>,
+    /// Whether POINTS came last.
+    after_points: bool,
+    of: Of,
+    /// Entries of an array of the current POINT_DATA or CELL_DATA.
+    tuples: u64,
 }
 
-/// The array `class` of the point data, if there is one.
-fn classes(source: &Source<'_>, after_points: usize, kind: &str) -> Result<Option<Vec<u8>>, ReadError> {
-    let rest = &source.bytes[after_points..];
-    let named = [&b"SCALARS class "[..], b"\nclass "].iter().any(|name| find(rest, name).is_some());
-    let (true, Some(start)) = (named, find(rest, b"\nPOINT_DATA ")) else {
-        return Ok(None);
-    };
-    let header = format!("# vtk DataFile Version 4.1\n-\n{kind}\nDATASET POLYDATA\nPOINTS 0 float\n");
-    let vtk = Vtk::parse_legacy_be(header.as_bytes().chain(&rest[start..])).map_err(|error| {
-        source.malformed(
-            At::Byte((after_points + start) as u64),
-            format!("point data with a `class` array that cannot be read ({error})"),
-        )
-    })?;
-    let DataSet::PolyData { pieces, .. } = vtk.data else {
-        return Ok(None);
-    };
-    for piece in pieces {
-        let Piece::Inline(piece) = piece else {
-            continue;
-        };
-        for attribute in piece.data.point {
-            let arrays: Vec<(String, IOBuffer)> = match attribute {
-                Attribute::DataArray(array) => vec![(array.name, array.data)],
-                Attribute::Field { data_array, .. } => {
-                    data_array.into_iter().map(|array| (array.name, array.data)).collect()
-                }
+impl Walk<'_> {
+    fn run(mut self) -> Result<ParticleFile, ReadError> {
+        loop {
+            let at = self.sections.at;
+            let Some(line) = self.sections.line() else {
+                break;
             };
-            if let Some(values) =
-                arrays.into_iter().find(|(name, _)| name == "class").and_then(|(_, data)| data.cast_into::<f64>())
-            {
-                return source.classes(&values).map(Some);
+            if !self.section(at, &line)? {
+                break;
             }
         }
+        let Some(positions) = self.positions else {
+            let found = format!("data set `{}` without", quote(&self.data_set));
+            return Err(self.sections.source.no_positions("POINTS expected", found));
+        };
+        Ok(ParticleFile { positions, classes: self.classes, ..ParticleFile::default() })
     }
-    Ok(None)
+
+    /// Reads or passes over the section that begins with `line`; `false` where it is unknown and so the last that is looked at.
+    fn section(&mut self, at: usize, line: &str) -> Result<bool, ReadError> {
+        let source = self.sections.source;
+        let bad = |what: &str| source.malformed(At::Byte(at as u64), format!("{what}: `{}`", quote(line)));
+        let words: Vec<&str> = line.split_ascii_whitespace().collect();
+        let keyword = words.first().copied().unwrap_or_default().to_ascii_uppercase();
+        let number = |i: usize| -> Result<u64, ReadError> {
+            words.get(i).and_then(|word| word.parse().ok()).ok_or_else(|| bad("a number is missing"))
+        };
+        let kind = |i: usize| words.get(i).copied().unwrap_or_default().to_ascii_lowercase();
+        let tuples = self.tuples;
+        match keyword.as_str() {
+            "DATASET" => self.data_set = kind(1).to_ascii_uppercase(),
+            "POINTS" => {
+                if self.positions.is_some() {
+                    return Err(bad("a second POINTS"));
+                }
+                let kind = kind(2);
+                if !matches!(kind.as_str(), "float" | "double") {
+                    return Err(source.wrong_shape("POINTS", format!("of type `{}`", quote(&kind)), "float or double"));
+                }
+                self.positions = Some(self.sections.points(number(1)?, &kind)?.finish());
+            }
+            "CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS" => {
+                let (first, second) = (number(1)?, number(2)?);
+                let offsets = self.sections.peek_line().filter(|line| line.to_ascii_uppercase().starts_with("OFFSETS"));
+                if offsets.is_none() {
+                    self.sections.skip(&keyword, "int", second)?;
+                } else {
+                    for (name, count) in [("OFFSETS", first), ("CONNECTIVITY", second)] {
+                        let line = self.sections.line().unwrap_or_default();
+                        let kind = line.split_ascii_whitespace().nth(1).unwrap_or_default().to_ascii_lowercase();
+                        self.sections.skip(name, &kind, count)?;
+                    }
+                }
+            }
+            "CELL_TYPES" => self.sections.skip(&keyword, "int", number(1)?)?,
+            "POINT_DATA" => {
+                (self.of, self.tuples) = (Of::Points, number(1)?);
+                let points = self.positions.as_ref().map_or(self.tuples, |positions| positions.len() as u64);
+                if points != self.tuples {
+                    return Err(bad(&format!("data for other than {points} points")));
+                }
+            }
+            "CELL_DATA" => (self.of, self.tuples) = (Of::Cells, number(1)?),
+            "SCALARS" => {
+                let components = if words.len() > 3 { number(3)? } else { 1 };
+                let table =
+                    self.sections.peek_line().filter(|line| line.to_ascii_uppercase().starts_with("LOOKUP_TABLE"));
+                table.and_then(|_| self.sections.line());
+                self.array(words.get(1).copied().unwrap_or_default(), &kind(2), components, tuples)?;
+            }
+            "COLOR_SCALARS" => {
+                self.sections.skip(&keyword, "unsigned_char", tuples.saturating_mul(number(2)?))?;
+            }
+            "LOOKUP_TABLE" => self.sections.skip(&keyword, "unsigned_char", number(2)?.saturating_mul(4))?,
+            "VECTORS" | "NORMALS" => self.sections.skip(&keyword, &kind(2), tuples.saturating_mul(3))?,
+            "TENSORS" => self.sections.skip(&keyword, &kind(2), tuples.saturating_mul(9))?,
+            "TENSORS6" => self.sections.skip(&keyword, &kind(2), tuples.saturating_mul(6))?,
+            "TEXTURE_COORDINATES" => self.sections.skip(&keyword, &kind(3), tuples.saturating_mul(number(2)?))?,
+            "GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS" => self.sections.skip(&keyword, &kind(2), tuples)?,
+            "FIELD" => {
+                for _ in 0..number(2)? {
+                    let Some(line) = self.sections.line() else {
+                        return Err(bad("the file ends within this FIELD"));
+                    };
+                    let words: Vec<&str> = line.split_ascii_whitespace().collect();
+                    let [name, components, tuples, kind] = words[..] else {
+                        // As METADATA after an array.
+                        return Ok(self.metadata(&line));
+                    };
+                    let (Ok(components), Ok(tuples)) = (components.parse(), tuples.parse()) else {
+                        return Err(source.malformed(self.sections.here(), format!("no array: `{}`", quote(&line))));
+                    };
+                    self.array(name, &kind.to_ascii_lowercase(), components, tuples)?;
+                }
+            }
+            "METADATA" => return Ok(self.metadata(line)),
+            "DIMENSIONS" | "SPACING" | "ORIGIN" | "ASPECT_RATIO" => {}
+            "X_COORDINATES" | "Y_COORDINATES" | "Z_COORDINATES" => {
+                self.sections.skip(&keyword, &kind(2), number(1)?)?;
+            }
+            _ if self.positions.is_none() => {
+                // Something that is not known here; what is wanted may still follow.
+                let next = find(&source.bytes[at..], b"\nPOINTS ");
+                self.sections.at = next.map_or(source.bytes.len(), |next| at + next);
+            }
+            _ if self.after_points => return Err(bad("a keyword expected after POINTS, which are more than promised")),
+            _ => return self.find_point_data(at),
+        }
+        self.after_points = keyword == "POINTS";
+        Ok(true)
+    }
+
+    /// Goes on behind an array of which the length is not known.
+    fn find_point_data(&mut self, at: usize) -> Result<bool, ReadError> {
+        let source = self.sections.source;
+        let rest = &source.bytes[at..];
+        if let Some(next) = find(rest, b"\nPOINT_DATA ") {
+            self.sections.at = at + next;
+            return Ok(true);
+        }
+        if self.classes.is_none() && [&b"SCALARS class "[..], b"\nclass "].iter().any(|name| find(rest, name).is_some())
+        {
+            let detail = "a `class` array behind something that cannot be read";
+            return Err(source.malformed(At::Byte(at as u64), detail));
+        }
+        Ok(false)
+    }
+
+    /// Reads the array if it is `class` of the points, or passes over it.
+    fn array(&mut self, name: &str, kind: &str, components: u64, tuples: u64) -> Result<(), ReadError> {
+        let count = components.saturating_mul(tuples);
+        if name != "class" || self.of != Of::Points {
+            return self.sections.skip(&format!("array `{}`", quote(name)), kind, count);
+        }
+        let source = self.sections.source;
+        if self.classes.is_some() {
+            return Err(source.malformed(self.sections.here(), "a second array `class`"));
+        }
+        if components != 1 {
+            return Err(source.wrong_shape(
+                "class",
+                format!("of {components} components"),
+                "one integer for each point",
+            ));
+        }
+        // As many as there are points, or refused later; never more than the file has bytes.
+        let mut classes = source.room(count.min(source.bytes.len() as u64), "classes")?;
+        let mut bad = Ok(());
+        self.sections.numbers("class", kind, count, |v| match source.class(v, classes.len()) {
+            Ok(class) => classes.push(class),
+            Err(error) if bad.is_ok() => bad = Err(error),
+            Err(_) => {}
+        })?;
+        bad?;
+        self.classes = Some(classes);
+        Ok(())
+    }
+
+    /// Passes over METADATA, which end at a blank line; `false` for anything else.
+    fn metadata(&mut self, line: &str) -> bool {
+        if !line.eq_ignore_ascii_case("METADATA") {
+            return false;
+        }
+        let rest = &self.sections.source.bytes[self.sections.at..];
+        let lines = rest.split_inclusive(|b| *b == b'\n');
+        let length: usize = lines.take_while(|line| !line.trim_ascii().is_empty()).map(<[u8]>::len).sum();
+        self.sections.at += length;
+        true
+    }
 }

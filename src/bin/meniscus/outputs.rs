@@ -1,0 +1,231 @@
+//! Where outputs go: what can be refused is refused before anything is rendered, and what is written appears whole or not
+//! at all.
+
+use crate::{
+    temporary::{self, Folder},
+    terminal,
+};
+use same_file::{Handle, is_same_file};
+use std::{
+    fs,
+    io::{self, ErrorKind, Write},
+    path::{Path, PathBuf},
+};
+
+/// Why something cannot be written, or was not.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    #[error("{}: cannot be written: {source}. {}", path.display(), remedy(source))]
+    Write { path: PathBuf, source: io::Error },
+    #[error("{}: there is no folder {}; create it", path.display(), folder.display())]
+    NoFolder { path: PathBuf, folder: PathBuf },
+    #[error("{}: is a folder; name a file", .0.display())]
+    IsFolder(PathBuf),
+    #[error("{}: is a link to nothing; name a file, or remove the link", .0.display())]
+    DeadLink(PathBuf),
+    #[error("{}: is {option} and {other} at once; give each a name of its own", path.display())]
+    Clash { path: PathBuf, option: &'static str, other: &'static str },
+    #[error(
+        "{}: holds {other} ({}), and --dump replaces its folder whole; name another folder", folder.display(), path.display()
+    )]
+    InsideDump { folder: PathBuf, path: PathBuf, other: &'static str },
+    #[error(
+        "{}: holds {found}, so it is no dump, and --dump replaces its folder whole; name a new folder", .folder.display()
+    )]
+    NoDump { folder: PathBuf, found: String },
+}
+
+fn remedy(e: &io::Error) -> &'static str {
+    match e.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            "Make room there, or write to another disk"
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => "Name a folder that you may write to",
+        ErrorKind::InvalidFilename => "Choose a shorter name",
+        ErrorKind::NotFound | ErrorKind::NotADirectory => "Create its folder",
+        _ => "Name another place",
+    }
+}
+
+fn failed(path: &Path) -> impl Fn(io::Error) -> OutputError + '_ {
+    move |source| OutputError::Write { path: path.into(), source }
+}
+
+/// A file that is read or written: what it is for, and its name.
+pub type Named<'a> = (&'static str, &'a Path);
+
+/// Refuses outputs that cannot be, before anything is rendered: in folders that are not there, in each other's place, in
+/// the place of an input, or in that of a folder with something else in it.
+pub fn check(outputs: &[Named], dump: Option<&Path>, inputs: &[Named]) -> Result<(), OutputError> {
+    for (_, path) in outputs {
+        check_file(path)?;
+        if is_stdout(path) {
+            terminal::leave_stdout();
+        }
+    }
+    for (i, (option, path)) in outputs.iter().enumerate() {
+        for (other, second) in outputs[..i].iter().chain(inputs) {
+            if same(path, second)? {
+                return Err(OutputError::Clash { path: (*path).into(), option, other });
+            }
+        }
+    }
+    let Some(folder) = dump else { return Ok(()) };
+    let place = resolve(folder)?;
+    let here = ("the current folder", Path::new("."));
+    for (other, path) in outputs.iter().chain(inputs).chain([&here]) {
+        // An input that is not there has an error message of its own.
+        if resolve(path).is_ok_and(|p| p.starts_with(&place)) {
+            return Err(OutputError::InsideDump { folder: folder.into(), path: (*path).into(), other });
+        }
+    }
+    check_dump(folder, &place)
+}
+
+/// Whether this is the program's own standard output, by its names or as the file that it was sent to.
+fn is_stdout(path: &Path) -> bool {
+    let names = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+    names.iter().any(|p| path == Path::new(p))
+        || path.is_file() && Handle::from_path(path).is_ok_and(|h| Handle::stdout().is_ok_and(|out| h == out))
+}
+
+/// Whether something is written to as it is, because a rename would put a file in its place: pipes, terminals, devices and
+/// what someone else has opened.
+fn special(path: &Path) -> bool {
+    let opened = ["/dev/stderr", "/dev/fd", "/proc"].iter().any(|p| path.starts_with(p));
+    opened || is_stdout(path) || !plain(path)
+}
+
+/// Whether this is a file, or nothing yet.
+fn plain(path: &Path) -> bool {
+    fs::metadata(path).map_or(true, |m| m.is_file() || m.is_dir())
+}
+
+fn check_file(path: &Path) -> Result<(), OutputError> {
+    if path.is_dir() {
+        return Err(OutputError::IsFolder(path.into()));
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return Err(OutputError::NoFolder { path: path.into(), folder: folder.into() });
+    }
+    if special(path) { Ok(()) } else { resolve(path).map(|_| ()) }
+}
+
+/// Whether two names are of one file, by whatever links; pipes and devices can be named twice.
+fn same(a: &Path, b: &Path) -> Result<bool, OutputError> {
+    if !plain(a) || !plain(b) {
+        return Ok(false);
+    }
+    if a.exists() && b.exists() {
+        return is_same_file(a, b).map_err(failed(a));
+    }
+    // What an input's name is of is for its reader to say.
+    Ok(resolve(b).is_ok_and(|b| resolve(a).is_ok_and(|a| a == b)))
+}
+
+/// The path without links and dots, whether or not there is something.
+fn resolve(path: &Path) -> Result<PathBuf, OutputError> {
+    match fs::canonicalize(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => {
+            if path.is_symlink() {
+                return Err(OutputError::DeadLink(path.into()));
+            }
+            let Some(name) = path.file_name() else { return Err(failed(path)(e)) };
+            let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            Ok(resolve(parent)?.join(name))
+        }
+        other => other.map_err(failed(path)),
+    }
+}
+
+/// Writes a file, whole or not at all.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    if !special(path) {
+        return temporary::write(&resolve(path)?, bytes).map_err(failed(path));
+    }
+    let written = if is_stdout(path) {
+        // Where it stands: opened anew it would begin at its start.
+        let mut out = io::stdout().lock();
+        out.write_all(bytes).and_then(|()| out.flush())
+    } else {
+        fs::OpenOptions::new().append(true).open(path).and_then(|mut f| f.write_all(bytes))
+    };
+    match written {
+        // Whoever read from the pipe has had enough.
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.map_err(failed(path)),
+    }
+}
+
+/// Files of a dump, but for the maps.
+const DUMPED: [&str; 9] = [
+    "pattern.npy",
+    "outcome.npy",
+    "hits.npy",
+    "path_length.npy",
+    "final_direction.npy",
+    "color_linear.npy",
+    "particles.npz",
+    "neighbours.npz",
+    FRAME,
+];
+/// In every dump, and known by its codes.
+const FRAME: &str = "frame.json";
+const MARK: &str = "\"pattern_codes\"";
+/// How the maps' names begin.
+const MAPS: [&str; 4] = ["splash_front_", "splash_back_", "body_front_", "body_back_"];
+
+/// Whether a dump may hold a file of this name.
+fn dumped(name: &str) -> bool {
+    let map = |rest: &str| matches!(rest, "depth.npy" | "normal.npy" | "depth_raw.npy" | "normal_raw.npy");
+    DUMPED.contains(&name) || MAPS.iter().any(|m| name.strip_prefix(m).is_some_and(map))
+}
+
+/// Refuses to replace a folder that is neither empty nor a dump.
+fn check_dump(folder: &Path, place: &Path) -> Result<(), OutputError> {
+    let no_dump = |found: String| Err(OutputError::NoDump { folder: folder.into(), found });
+    if !place.exists() {
+        return Ok(());
+    }
+    let mut empty = true;
+    for entry in fs::read_dir(place).map_err(failed(folder))? {
+        let entry = entry.map_err(failed(folder))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if !dumped(&name) || !entry.file_type().is_ok_and(|t| t.is_file()) {
+            return no_dump(format!("\"{name}\""));
+        }
+        empty = false;
+    }
+    if empty || fs::read_to_string(place.join(FRAME)).is_ok_and(|text| text.contains(MARK)) {
+        return Ok(());
+    }
+    no_dump(format!("no {FRAME} of a dump"))
+}
+
+/// A dump in the making.
+pub struct Dump<'a> {
+    /// As it was named.
+    name: &'a Path,
+    place: PathBuf,
+    folder: Folder,
+}
+
+impl<'a> Dump<'a> {
+    pub fn new(name: &'a Path) -> Result<Dump<'a>, OutputError> {
+        let place = resolve(name)?;
+        Ok(Dump { name, folder: Folder::new(&place).map_err(failed(name))?, place })
+    }
+
+    pub fn write(&self, file: &str, bytes: &[u8]) -> Result<(), OutputError> {
+        assert!(dumped(file), "{file} is missing among the names of a dump");
+        self.folder.write(file, bytes).map_err(failed(&self.name.join(file)))
+    }
+
+    /// It is whole: takes its name, and the place of an older dump.
+    pub fn finish(self) -> Result<(), OutputError> {
+        // Rendering takes a while; someone may have put something there.
+        check_dump(self.name, &self.place)?;
+        self.folder.finish().map_err(failed(self.name))
+    }
+}

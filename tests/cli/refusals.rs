@@ -1,0 +1,65 @@
+//! What is refused, and how that is said.
+
+use crate::{Run, block};
+
+#[test]
+fn bad_files_are_refused() {
+    let run = Run::new();
+    let empty = run.file("empty.vtk", "");
+    let text = run.file("text.vtk", "this is no particle file\n");
+    let torn = run.file("torn.csv", "x,y,z\n1,2\n");
+    let nan = run.file("nan.csv", "x,y,z\n0,0,0\nnan,1,1\n0.1,0,0\n");
+    let words = run.file("words.csv", "x,y,z\na,b,c\n");
+    let env = run.file("env.hdr", "#?RADIANCE\n");
+    let out = ["render", "-o", "out.png", "--size", "64x48"];
+    let with = |extra: &[&str]| -> Vec<String> { out.iter().chain(extra).map(|s| (*s).to_owned()).collect() };
+    let check = |extra: &[&str], words: &[&str]| {
+        let all = with(extra);
+        run.refused(1, &all.iter().map(String::as_str).collect::<Vec<_>>(), words);
+    };
+    check(&["missing.vtk"], &["missing.vtk", "no such file"]);
+    check(&[&empty], &["empty.vtk"]);
+    check(&[&text], &["text.vtk"]);
+    check(&[&torn], &["torn.csv", "line 2"]);
+    check(&[&words], &["words.csv", "line 2"]);
+    check(&[&nan], &["nan.csv", "--drop-invalid"]);
+    check(&["particles.xyzzy"], &["xyzzy"]);
+    check(&[run.folder.path().to_str().unwrap()], &["directory"]);
+    check(&["--env", &env], &["env.hdr"]);
+    check(&["--env", "no.exr"], &["no.exr"]);
+    run.render(&[&nan, "--drop-invalid", "--radius", "0.05"]);
+}
+
+#[test]
+fn bad_parameters_are_refused() {
+    let run = Run::new();
+    let block = run.file("block.csv", block(0.0));
+    let refuse = |code: i32, extra: &[&str], words: &[&str]| {
+        let mut all = vec!["render", block.as_str(), "-o", "out.png"];
+        all.extend(extra);
+        run.refused(code, &all, words);
+    };
+    refuse(1, &["--radius", "0"], &["radius"]);
+    refuse(1, &["--radius", "-1"], &["radius"]);
+    refuse(1, &["--radius", "nan"], &["radius"]);
+    refuse(1, &["--size", "0x48"], &["size", "1 to"]);
+    refuse(1, &["--size", "64x999999"], &["size", "1 to"]);
+    refuse(2, &["--size", "64"], &["WIDTHxHEIGHT"]);
+    refuse(2, &["--eye", "1,2"], &["three finite numbers"]);
+    refuse(2, &["--supersample", "4"], &["supersample"]);
+    refuse(1, &["--refractions", "3"], &["refractions", "1, 2 or 4"]);
+    refuse(1, &["--window", "8"], &["window", "odd"]);
+    refuse(1, &["--window", "27"], &["window", "25"]);
+    refuse(1, &["--sigma", "0"], &["sigma"]);
+    refuse(1, &["--ior", "1"], &["index of refraction"]);
+    refuse(1, &["--absorption", "-1,0,0"], &["absorption"]);
+    refuse(1, &["--fov-y", "180"], &["fov-y"]);
+    refuse(1, &["--up", "0,0,0"], &["up"]);
+    refuse(1, &["--eye", "0,0,0", "--target", "0,0,0"], &["eye and target"]);
+    refuse(3, &["--device", "no such device"], &["no such device", "meniscus info"]);
+    run.refused(1, &["render", "-o", "out.gif"], &["out.gif", ".png"]);
+    run.refused(1, &["render", "-o", "nowhere/out.png", "--size", "64x48"], &["nowhere/out.png"]);
+    let long = format!("{}.png", "x".repeat(300));
+    run.refused(1, &["render", "-o", &long, "--size", "64x48"], &["xxx.png", "cannot be written", "shorter"]);
+    run.refused(2, &["render"], &["--output"]);
+}
