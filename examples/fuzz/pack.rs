@@ -66,6 +66,13 @@ pub fn png(header: &[u8; 13], rows: &[u8]) -> Vec<u8> {
     content
 }
 
+/// Sets the length of a NumPy header to what it is.
+pub fn mend_npy(content: &mut [u8]) {
+    if let Some(end) = content.iter().position(|b| *b == b'\n').filter(|end| *end >= 10) {
+        content[8..10].copy_from_slice(&((end - 9) as u16).to_le_bytes());
+    }
+}
+
 /// Computes the checksums of all chunks, as far as they can be followed.
 pub fn mend_png(content: &mut [u8]) {
     let mut at = 8;

@@ -233,6 +233,9 @@ fn data_that_do_not_end_where_the_header_says_are_refused() {
     let doubles = [1.5_f64, 2.5, 3.5, 4.5, 5.5, 6.5].map(f64::to_be_bytes).concat();
     assert!(refused("a.vtk", [&vtk[..], &doubles].concat()).contains("keyword"));
     refused("a.vtk", "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 1 float\n1 2 3 4 5 6\n");
+    let unknown = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 1 float\n1 2 3\nSOMETHING 1\n7\nPOINT_DATA 1\n\
+                   SCALARS class int\nLOOKUP_TABLE default\n1\n";
+    assert_eq!(bytes("a.vtk", unknown).unwrap().classes, Some(vec![1]));
     refused(
         "a.vtk",
         "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 1 float\n1 2 3\nPOINTS 1 float\n4 5 6\n",

@@ -57,6 +57,11 @@ impl Source<'_> {
         Ok(Vec::with_capacity(count as usize))
     }
 
+    /// Notes work that is as much as unpacking so many bytes.
+    pub(super) fn unpack(&self, bytes: u64, what: &str) -> Result<(), ReadError> {
+        self.ledger.unpack(bytes, what).map_err(|over| self.too_large(over))
+    }
+
     /// Room for so many more positions, read number by number.
     pub(super) fn triples(&self, count: u64) -> Result<Triples, ReadError> {
         Ok(Triples { positions: self.room(count, "positions")?, open: [0.0; 3], filled: 0 })

@@ -164,7 +164,12 @@ impl Walk<'_> {
                 let next = find(&source.bytes[at..], b"\nPOINTS ");
                 self.sections.at = next.map_or(source.bytes.len(), |next| at + next);
             }
-            _ if self.after_points => return Err(bad("a keyword expected after POINTS, which are more than promised")),
+            // Another keyword is only unknown; what is none is a part of POINTS.
+            _ if self.after_points
+                && !(keyword.len() > 3 && keyword.bytes().all(|b| b.is_ascii_uppercase() || b == b'_')) =>
+            {
+                return Err(bad("a keyword expected after POINTS, which are more than promised"));
+            }
             _ => return self.find_point_data(at),
         }
         self.after_points = keyword == "POINTS";

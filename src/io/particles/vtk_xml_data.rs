@@ -15,6 +15,9 @@ use crate::io::quote::quote;
 /// Bytes that are unpacked at a time.
 const PART: usize = 1 << 16;
 
+/// Beginning with a block takes about as long as unpacking so many bytes.
+const BEGIN: u64 = 4096;
+
 /// How the file stores its arrays.
 #[derive(Default)]
 pub(super) struct Encoding<'a> {
@@ -128,6 +131,7 @@ impl Array<'_> {
                     rest = after;
                     let full = if i + 1 == head[0] && head[2] != 0 { head[2] } else { head[1] };
                     zlib.reset(block);
+                    source.unpack(BEGIN, "unpacked blocks")?;
                     let inner = &mut zlib;
                     let mut stream =
                         Metered { inner, ledger: source.ledger, what: "unpacked blocks" }.take(full as u64);
