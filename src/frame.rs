@@ -2,8 +2,7 @@
 //! shader in `glsl/`, its CPU twin in `src/twin/` and its test in `tests/gpu/`, all under the same name.
 
 use crate::{
-    Error, passes::Passes, recorder::Recorder, renderer::Background, settings::Settings, shader::Prepare,
-    targets::Needs,
+    Error, input::Background, passes::Passes, recorder::Recorder, settings::Settings, shader::Prepare, targets::Needs,
 };
 
 /// Records the passes of one frame. What a scene does not need is not there: no splash particles, no splash maps; one

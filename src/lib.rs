@@ -35,6 +35,7 @@ pub mod error;
 pub mod frame;
 #[cfg(feature = "host")]
 pub mod host;
+pub mod input;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod particles;
@@ -55,6 +56,7 @@ pub mod twin;
 pub use device::Host;
 pub use environment::{Equirect, EquirectBuilder};
 pub use error::Error;
+pub use input::{Background, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput};
 pub use particles::{Class, Ellipsoid, Particles};
-pub use renderer::{Background, EnvironmentInput, EnvironmentShape, FrameInput, Renderer, SceneInput};
+pub use renderer::Renderer;
 pub use settings::{Camera, Fresnel, Settings, Weighting};

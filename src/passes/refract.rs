@@ -4,9 +4,9 @@ use super::Pipelines;
 use crate::{
     Error,
     access::Access,
+    input::{Background, EnvironmentShape},
     pipeline::{Graphics, Pipeline},
     recorder::{Recorder, bound, used},
-    renderer::{Background, EnvironmentShape},
     settings::{Fresnel, Settings},
     shader::{self, REFRACT_VERT, Shader},
     targets::{Id, Needs},

@@ -1,0 +1,105 @@
+//! What the host gives for one frame: particles and camera, its own picture, and where the result goes.
+
+use crate::{
+    prepare::DevicePositions,
+    settings::{Camera, Settings},
+};
+use ash::vk;
+
+/// What a frame shows where no liquid is, and what rays bring back that meet neither liquid nor scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Background {
+    /// The environment, and before it the scene: every pixel of the output is written, with alpha 1. What the output held
+    /// is lost, and where the scene's depth is cleared, so is its colour.
+    #[default]
+    Environment,
+    /// The host's own picture: the output is loaded, and only pixels that show liquid are written, with alpha 1, so that
+    /// alpha is the liquid's coverage where the host cleared it to 0. Rays that meet nothing take the scene's colour where
+    /// its depth is cleared in the direction they go (the host's sky), and the environment where that is out of view.
+    Host,
+}
+
+/// An environment of the host's own, in place of [`Renderer::set_environment`](crate::Renderer::set_environment)'s.
+#[derive(Clone, Copy, Debug)]
+pub struct EnvironmentInput {
+    /// Linear light, infinitely far away, sampled in the fragment stage; mip level 0 is used.
+    pub view: vk::ImageView,
+    /// Layout it is in, before and after.
+    pub layout: vk::ImageLayout,
+    /// How directions find their texel.
+    pub shape: EnvironmentShape,
+}
+
+/// How an environment maps directions; those of the world, turned so that [`Camera::up`] becomes +y.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EnvironmentShape {
+    /// A `TYPE_2D` view, laid out as [`crate::Equirect`] is.
+    #[default]
+    Equirect,
+    /// A `TYPE_CUBE` view, looked up by the direction itself, as Vulkan defines it.
+    Cube,
+}
+
+/// The host's opaque scene, rendered before the liquid at the same size and with the same camera. It hides liquid, is seen
+/// through it, and ends rays under water: liquid whose wall lies a few radii before an opaque surface touches it.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneInput {
+    /// Linear colour, sampled in the fragment stage.
+    pub color: vk::ImageView,
+    /// Layout the colour is in, before and after.
+    pub color_layout: vk::ImageLayout,
+    /// Depth buffer (depth aspect) of the camera's projection, sampled in the fragment stage.
+    pub depth: vk::ImageView,
+    /// Layout the depth is in, before and after.
+    pub depth_layout: vk::ImageLayout,
+    /// Depth value where nothing was drawn: what is infinitely far away is seen there (see [`Background`]).
+    pub cleared_depth: f32,
+}
+
+/// One frame.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameInput<'a> {
+    /// Which of the frames in flight this is.
+    pub slot: usize,
+    /// Camera.
+    pub camera: &'a Camera,
+    /// Smoothing and optics.
+    pub settings: &'a Settings,
+    /// Positions on the device, to be prepared in this frame and drawn instead of [`Renderer::set_particles`](crate::Renderer::set_particles)'s.
+    pub positions: Option<DevicePositions>,
+    /// Host's opaque scene, if there is one.
+    pub scene: Option<SceneInput>,
+    /// What is seen where no liquid is.
+    pub background: Background,
+    /// Host's own environment; without one that of [`Renderer::set_environment`](crate::Renderer::set_environment).
+    pub environment: Option<EnvironmentInput>,
+    /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it.
+    pub eye_inside: bool,
+    /// Output, of the format given to [`Renderer::new`](crate::Renderer::new) and the size given to [`Renderer::resize`](crate::Renderer::resize), in
+    /// `COLOR_ATTACHMENT_OPTIMAL` before and after.
+    pub output: vk::ImageView,
+    /// Also write what each walk met into [`Id::Walk`](crate::targets::Id::Walk) and [`Id::Direction`](crate::targets::Id::Direction), for dumps and statistics.
+    pub debug: bool,
+    /// Where positions are prepared on the device, also list so many neighbours of every particle in [`Id::Neighbours`](crate::targets::Id::Neighbours):
+    /// for each its index, how many there are, and the indices of the first of them; 0 lists none. For tests and dumps.
+    pub neighbours: u32,
+}
+
+impl<'a> FrameInput<'a> {
+    /// A frame of the particles last given, before the environment alone; anything else by struct update.
+    pub fn new(slot: usize, camera: &'a Camera, settings: &'a Settings, output: vk::ImageView) -> FrameInput<'a> {
+        FrameInput {
+            slot,
+            camera,
+            settings,
+            positions: None,
+            scene: None,
+            background: Background::Environment,
+            environment: None,
+            eye_inside: false,
+            output,
+            debug: false,
+            neighbours: 0,
+        }
+    }
+}
