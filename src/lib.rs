@@ -13,8 +13,23 @@
 //! * Frames are submitted to one queue in the order they were recorded. Before the host records into a slot again
 //!   (`slot < frames_in_flight`), the frame last recorded into it has completed. Replaced resources are kept until
 //!   then, and destroyed without waiting.
+//! * A frame that was recorded and never runs (its command buffer was reset, or is not submitted) is said to be so with
+//!   [`Renderer::abandon`] before anything else is recorded. What [`Renderer::set_environment`] recorded has to run.
+//! * Several views of one picture's size are as many calls of [`Renderer::record`], each with a slot of its own: make
+//!   `frames_in_flight` the views times the frames. A view of another size wants a renderer of its own, because targets are
+//!   made anew whenever the size changes.
 //! * The output image is in `COLOR_ATTACHMENT_OPTIMAL` before and after; it is written as a colour attachment.
-//!   The host makes it available before, and makes it visible afterwards.
+//!   The host makes it available before (for reading too, where [`Background::Host`] keeps what it holds), and makes it
+//!   visible afterwards.
+//! * [`Background`] says what is seen without liquid. With [`Background::Environment`], the default, every pixel is
+//!   written, alpha is 1, and where the scene's depth is cleared the environment replaces the host's colour. With
+//!   [`Background::Host`] only pixels that show liquid are written, with alpha 1: the host's picture stays, its sky is
+//!   refracted, and an output cleared to alpha 0 ends up with the liquid's coverage.
+//! * A host's opaque scene ([`SceneInput`]) hides liquid, is refracted by it, and ends rays in it, with absorption up to
+//!   there. It is the depth buffer's first surface: what that hides from the eye no ray can meet.
+//! * The environment is a map given once ([`Renderer::set_environment`]) or an image view of the host's
+//!   ([`EnvironmentInput`]), equirectangular or a cube.
+//! * Left-handed worlds, viewports of negative height, reversed and infinite depth: see [`Camera`].
 //! * Particles are prepared on the host ([`prepare::prepare`], [`Renderer::set_particles`]) or, frame by frame, on the device
 //!   from positions in a buffer of the host's ([`prepare::DevicePositions`]): then no count ever comes back, and what a
 //!   scene does not need is an indirect draw or dispatch of nothing.
@@ -22,8 +37,8 @@
 //!
 //! # Spaces and units
 //!
-//! World units are the scene's own; shaders work in the liquid's own [`space`], so that any scale gives the same picture. Eye space is right-handed and looks down -z; *linear depth* is `d = -z_eye > 0`.
-//! Colours are linear; a UNORM output is encoded as sRGB in the last shader, a float output is not.
+//! World units are the scene's own; shaders measure in particle radii (see [`space`]), so that any scale gives the same
+//! picture. Eye space is right-handed and looks down -z; *linear depth* is `d = -z_eye > 0`. Colours are linear; a UNORM output is encoded as sRGB in the last shader, a float output is not.
 #![warn(missing_docs)]
 #![deny(unsafe_op_in_unsafe_fn)]
 #![warn(clippy::undocumented_unsafe_blocks)]
@@ -52,6 +67,9 @@ mod slot;
 pub mod space;
 pub mod targets;
 pub mod twin;
+
+// Of the versions whose types stand in the public interface.
+pub use {ash, glam, gpu_allocator};
 
 pub use device::Host;
 pub use environment::{Equirect, EquirectBuilder};

@@ -47,6 +47,11 @@ impl Profiler {
         unsafe { device.cmd_reset_query_pool(cmd, self.pool, 0, 2 * SCOPES) };
     }
 
+    /// What was recorded of this frame will never run: there is nothing to read.
+    pub fn abandon_frame(&mut self) {
+        self.names.clear();
+    }
+
     pub fn begin(&mut self, device: &ash::Device, cmd: vk::CommandBuffer, name: &str) {
         if (self.names.len() as u32) < SCOPES {
             self.names.push(name.into());

@@ -293,10 +293,24 @@ impl Renderer {
         let recorded = frame::record(&mut recorder, &mut self.passes, &needs, input.settings, prepare.as_ref());
         match &recorded {
             Ok(()) => slot.frame = self.frame,
-            // The barriers recorded so far will never run: start again from new resources.
-            Err(_) => self.table.retire_all(&mut self.retired, self.frame + 1),
+            Err(_) => self.abandon(input.slot),
         }
         recorded
+    }
+
+    /// Says that the frame last recorded into a slot will never run: its command buffer was reset, or is not submitted.
+    /// To be called before anything else is recorded. Waits for nothing.
+    pub fn abandon(&mut self, slot: usize) {
+        // Its barriers never run either: start again from new resources. Classes of an earlier frame are not kept.
+        self.table.retire_all(&mut self.retired, self.frame + 1);
+        self.last_classes = None;
+        if let Some(slot) = self.slots.get_mut(slot) {
+            // That this slot is free again says nothing of frames before this one, which may still run.
+            slot.frame = 0;
+            if let Some(p) = &mut slot.profiler {
+                p.abandon_frame();
+            }
+        }
     }
 
     /// The barriers of the last recorded frame, in order; printable.

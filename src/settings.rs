@@ -104,14 +104,21 @@ impl Settings {
     }
 }
 
-/// A perspective camera.
+/// A perspective camera, as it is drawn with: the picture's upper left corner is (-1, -1) in Vulkan's clip space.
+///
+/// * Left-handed worlds: `view` may mirror. An eye space that looks along +z, with w = +z, becomes this one by
+///   F = diag(1, 1, -1, 1): `projection: p * F`, `view: F * v`.
+/// * Viewports of negative height turn y around after the projection: negate `projection`'s second row.
+/// * Of the projection x and y count, and for the depth of a host's scene how z becomes a depth; `near` stands for itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// World to eye: a rotation and a translation.
+    /// World to eye: a rotation, with or without a reflection, and a translation.
     pub view: Mat4,
     /// Eye to Vulkan clip space (y down), perspective: w = -z. May be off-centre, jittered, reversed or infinite.
     pub projection: Mat4,
-    /// Distance of the near plane, above 0. What is nearer is not drawn.
+    /// Distance from the eye along the view axis, above 0, before which no liquid is drawn. It need not be the projection's
+    /// near plane: farther than that it cuts liquid off, nearer it draws liquid before what the host's own scene can hold. An
+    /// eye in the liquid sees from there on.
     pub near: f32,
     /// World direction in which the environment map's +y points.
     pub up: Vec3,
@@ -131,11 +138,11 @@ impl Camera {
     pub fn validate(&self) -> Result<(), Error> {
         let r = Mat3::from_mat4(self.view);
         let rigid = (r * r.transpose()).abs_diff_eq(Mat3::IDENTITY, 1e-3)
-            && r.determinant() > 0.0
             && self.view.is_finite()
             && self.view.row(3).abs_diff_eq(Vec4::W, 1e-6);
         if !rigid {
-            let remedy = "use a rotation and a translation; scale the scene instead, and keep eye, target and up apart";
+            let remedy = "use a rotation (it may mirror) and a translation; scale the scene instead, and keep eye, target and \
+                          up apart";
             return Err(Error::parameter("camera view", self.view, remedy));
         }
         let p = &self.projection;
