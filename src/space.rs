@@ -8,6 +8,10 @@ use crate::{
 };
 use glam::{DMat3, DVec3, Mat4, Vec3, Vec4};
 
+/// Particle radii, in world units, that float32 positions have room around: coordinates to a millionth of such a radius and
+/// to a million of them are normal numbers, which no device rounds to zero.
+pub const RADII: std::ops::RangeInclusive<f32> = 1e-31..=1e31;
+
 /// Where the liquid's own space lies in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Space {

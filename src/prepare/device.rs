@@ -91,12 +91,13 @@ impl DevicePositions {
     }
 }
 
+/// What to do about a radius.
+pub(crate) const RADIUS_REMEDY: &str = "give half the rest spacing, in world units, from 1e-31 to 1e31";
+
 impl From<PrepareError> for Error {
     fn from(e: PrepareError) -> Error {
         match e {
-            PrepareError::Radius(r) => {
-                Error::parameter("particle radius", r, "give half the rest spacing, in world units")
-            }
+            PrepareError::Radius(r) => Error::parameter("particle radius", r, RADIUS_REMEDY),
             PrepareError::Option { name, value, must } => Error::parameter(name, value, format!("it must be {must}")),
             other => Error::parameter("particles", "", other.to_string()),
         }

@@ -60,8 +60,10 @@ pub struct Report {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs)] // the fields are what the messages below say they are
 pub enum PrepareError {
-    /// A radius that is not finite and positive.
-    #[error("particle radius {0} is not a positive number: give half the rest spacing, in world units")]
+    /// A radius outside of [`crate::space::RADII`].
+    #[error(
+        "particle radius {0:e}: give half the rest spacing, in world units, from 1e-31 to 1e31; scale the scene if need be"
+    )]
     Radius(f32),
     /// An option out of its range.
     #[error("option {name} = {value}: it must be {must}")]

@@ -2,6 +2,7 @@
 
 use super::PrepareError;
 use super::neighbours::Search;
+use crate::space;
 
 /// What can be chosen; the defaults suit SPH frames with a support of four radii.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,8 +49,7 @@ pub(super) struct Scale {
 impl Scale {
     /// Checks the radius and every option.
     pub fn new(radius: f32, options: &Options) -> Result<Self, PrepareError> {
-        // Its reciprocal has to be a float32 too.
-        if !(f32::MIN_POSITIVE..=f32::MIN_POSITIVE.recip()).contains(&radius) {
+        if !space::RADII.contains(&radius) {
             return Err(PrepareError::Radius(radius));
         }
         let support = options.support.unwrap_or(4.0 * radius);

@@ -5,8 +5,9 @@ use crate::{
     Error, access,
     environment::Equirect,
     particles::Particles,
+    prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},
-    space::Space,
+    space::{self, Space},
     targets::Id,
 };
 use ash::vk;
@@ -18,8 +19,8 @@ impl Renderer {
     /// frames that draw them have completed.
     pub fn set_particles(&mut self, particles: &Particles) -> Result<(), Error> {
         let count = particles.ellipsoids.len();
-        if !(particles.radius.is_finite() && particles.radius > 0.0) {
-            return Err(Error::parameter("particle radius", particles.radius, "use a finite length above 0"));
+        if !space::RADII.contains(&particles.radius) {
+            return Err(PrepareError::Radius(particles.radius).into());
         }
         if particles.splash_count > count {
             return Err(Error::parameter(

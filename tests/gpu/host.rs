@@ -5,7 +5,7 @@ use ash::vk;
 use glam::Vec3;
 use meniscus::{
     Equirect, Error, FrameInput, Particles, Renderer, SceneInput, Settings,
-    host::{Canvas, Gpu, Upload},
+    host::{Canvas, Gpu, HostError, Upload},
     prepare::{DevicePositions, Search},
     targets::Needs,
     twin::optics::srgb_byte,
@@ -295,6 +295,42 @@ fn what_the_caller_gets_wrong_is_said() {
             // SAFETY: a new renderer on the same device; refused or destroyed at once.
             let other = unsafe { Renderer::new(gpu.host(1), vk::Format::R32G32_UINT) };
             assert!(other.err().expect("no colour attachment").to_string().contains("R32G32_UINT"));
+        });
+    });
+}
+
+/// Frames that are recorded and thrown away, between frames that run, with everything kept from frame to frame.
+#[test]
+fn frames_that_never_run_leave_no_trace() {
+    each_driver(|driver| {
+        with_renderer(driver, vk::Format::R32G32B32A32_SFLOAT, 2, |gpu, renderer| {
+            let cloud = random_cloud(2, 0.1, Vec3::splat(-0.6), Vec3::splat(0.6), 0, 700);
+            let positions: Vec<Vec3> = cloud.ellipsoids.iter().map(|e| e.center).collect();
+            let upload = Upload::new(gpu, bytemuck::cast_slice(&positions)).expect("upload");
+            let case = case(cloud);
+            let canvas = Canvas::new(gpu, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE).expect("canvas");
+            let packed = DevicePositions::packed(upload.buffer, positions.len() as u32, 0.1);
+            let kept = DevicePositions { keep_class_below: Some(0.6), ..packed };
+            let mut pictures = Vec::new();
+            for (slot, runs) in [(0, true), (1, false), (0, true), (1, true), (0, false), (1, false), (0, true)] {
+                let done = gpu.run(|cmd| {
+                    canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+                    let input = FrameInput { positions: Some(kept), ..input(&case, slot, canvas.view) };
+                    // SAFETY: `cmd` is recording outside rendering; the slot's last frame was waited for, or abandoned.
+                    unsafe { renderer.record(cmd, &input) }?;
+                    // An error makes `run` throw the command buffer away.
+                    if runs { Ok(()) } else { Err(HostError::Renderer(Error::Order("thrown away"))) }
+                });
+                assert_eq!(done.is_ok(), runs, "{}: {done:?}", driver.name);
+                if runs {
+                    assert!(renderer.times(slot).is_some(), "{}: no times", driver.name);
+                    pictures.push(canvas.read().expect("picture"));
+                } else {
+                    renderer.abandon(slot);
+                    assert!(renderer.times(slot).is_none(), "{}: times of nothing", driver.name);
+                }
+            }
+            assert!(pictures.windows(2).all(|p| p[0] == p[1]), "{}: other pictures", driver.name);
         });
     });
 }

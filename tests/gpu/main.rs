@@ -14,6 +14,7 @@ mod refract;
 mod shape;
 mod smoke;
 mod sort;
+mod space;
 mod splat;
 mod support;
 mod tiles;

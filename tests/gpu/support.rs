@@ -81,12 +81,21 @@ impl<'a> Driver<'a> {
     /// Renders a case (with `debug` targets) and reads everything back.
     pub fn shoot(&self, case: &Case) -> Shot {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
-        self.shoot_frame(case, None)
+        self.shoot_input(case, &|input| input)
     }
 
     /// The same for positions prepared on the device, with every neighbour listed; they begin at `offset` bytes of their
     /// buffer and lie `stride` bytes apart. Of the case's particles only the radius counts.
     pub fn shoot_cloud(&self, case: &Case, cloud: &Cloud) -> Shot {
+        self.shoot_listed(case, cloud, 1022)
+    }
+
+    /// The same without lists of neighbours.
+    pub fn shoot_cloud_unlisted(&self, case: &Case, cloud: &Cloud) -> Shot {
+        self.shoot_listed(case, cloud, 0)
+    }
+
+    fn shoot_listed(&self, case: &Case, cloud: &Cloud, neighbours: u32) -> Shot {
         let mut words = vec![f32::NAN; (cloud.offset + cloud.stride * cloud.positions.len()) / 4 + 3];
         for (i, p) in cloud.positions.iter().enumerate() {
             let at = (cloud.offset + i * cloud.stride) / 4;
@@ -103,7 +112,7 @@ impl<'a> Driver<'a> {
             options: cloud.options,
             keep_class_below: cloud.keep_class_below,
         };
-        self.shoot_frame(case, Some(positions))
+        self.shoot_input(case, &|input| FrameInput { positions: Some(positions), neighbours, ..input })
     }
 
     /// The same before a scene of the host's.
@@ -122,17 +131,12 @@ impl<'a> Driver<'a> {
         self.session.borrow().gpu
     }
 
-    fn shoot_frame(&self, case: &Case, positions: Option<DevicePositions>) -> Shot {
-        self.shoot_input(case, &|input| FrameInput { positions, ..input })
-    }
-
     fn shoot_input(&self, case: &Case, change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>) -> Shot {
         let session = &mut *self.session.borrow_mut();
         session.resize(case.size).expect("size");
         let input = FrameInput {
             eye_inside: case.eye_inside,
             debug: true,
-            neighbours: 1022,
             ..FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null())
         };
         session.frame(&change(input)).expect("frame");
