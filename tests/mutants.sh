@@ -15,7 +15,9 @@ while IFS= read -r line; do
   IFS=$'\t' read -r file from to test <<< "${line// ::: /$'\t'}"
   FROM=$from TO=$to perl -0pi -e 'my $n = s/\Q$ENV{FROM}\E/$ENV{TO}/g; die "$ARGV: found $n times: $ENV{FROM}\n" if $n != 1' "$copy/$file"
   planted=$((planted + 1))
-  if (cd "$copy" && cargo test --quiet --test gpu -- --exact "$test" > mutant.log 2>&1); then
+  binary=gpu
+  [[ $test == endurance::* ]] && binary=endurance
+  if (cd "$copy" && cargo test --quiet --test "$binary" -- --exact "${test#endurance::}" > mutant.log 2>&1); then
     echo "SURVIVED  $file: $from -> $to ($test)"
     survived=$((survived + 1))
   elif grep -q "error: could not compile" "$copy/mutant.log"; then

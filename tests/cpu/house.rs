@@ -45,6 +45,29 @@ fn no_file_is_too_long() {
     }
 }
 
+/// The list of planted mistakes fits the code: each text is there once, and each test exists.
+#[test]
+fn planted_mistakes_can_be_planted() {
+    let list = fs::read_to_string(root().join("tests/mutants.txt")).expect("the list");
+    let mut found = 0;
+    for line in list.lines().filter(|l| !l.is_empty() && !l.starts_with('#')) {
+        let [file, text, _, test] = line.split(" ::: ").collect::<Vec<_>>()[..] else {
+            panic!("not four columns: {line}");
+        };
+        let code = fs::read_to_string(root().join(file)).expect("a file of the repository");
+        assert_eq!(code.matches(text).count(), 1, "{file}: {text}");
+        let (module, name) = test.split_once("::").expect("module::test");
+        let tests = match module {
+            "endurance" => "tests/endurance.rs".into(),
+            module => format!("tests/gpu/{module}.rs"),
+        };
+        let tests = fs::read_to_string(root().join(tests)).expect("a module of tests");
+        assert!(tests.contains(&format!("fn {name}(")), "there is no test {test}");
+        found += 1;
+    }
+    assert!(found > 50, "only {found}");
+}
+
 /// Macros that panic where what they write cannot be written: the library says nothing, and the command says what it has
 /// to say through src/bin/meniscus/terminal.rs.
 #[test]
