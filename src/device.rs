@@ -103,6 +103,12 @@ pub fn name(properties: &vk::PhysicalDeviceProperties) -> String {
     properties.device_name_as_c_str().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
+/// Bytes of the largest device-local heap.
+pub(crate) fn largest_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
+    let local = memory.memory_heaps_as_slice().iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+    local.map(|h| h.size).max().unwrap_or(0)
+}
+
 impl Host {
     pub(crate) fn limits(&self) -> Limits {
         // SAFETY: `Host` promises a live instance and a physical device of it.
@@ -114,8 +120,6 @@ impl Host {
         };
         // SAFETY: as above.
         let memory = unsafe { self.instance.get_physical_device_memory_properties(self.physical_device) };
-        let local =
-            memory.memory_heaps_as_slice().iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
         let bits = families.get(self.queue_family as usize).map_or(0, |f| f.timestamp_valid_bits);
         Limits {
             point_size: if self.large_points { properties.limits.point_size_range[1] } else { 1.0 },
@@ -123,7 +127,7 @@ impl Host {
             timestamp_period: (bits > 0).then_some(properties.limits.timestamp_period),
             timestamp_mask: if bits >= 64 { u64::MAX } else { (1u64 << bits) - 1 },
             storage_size: u64::from(properties.limits.max_storage_buffer_range),
-            memory: local.map(|h| h.size).max().unwrap_or(0),
+            memory: largest_heap(&memory),
         }
     }
 

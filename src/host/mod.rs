@@ -96,6 +96,8 @@ pub struct DeviceInfo {
     pub point_size: f32,
     /// Largest image edge.
     pub image_size: u32,
+    /// Bytes of the largest heap of device memory.
+    pub memory: u64,
     /// Whether passes can be timed.
     pub timestamps: bool,
     /// Whether large points are there.
@@ -192,14 +194,15 @@ impl Instance {
     fn describe(&self, handle: vk::PhysicalDevice) -> DeviceInfo {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         // SAFETY: the physical device is this instance's; the chain lives on this stack frame.
-        let (properties, features, families) = unsafe {
+        let (properties, features, families, memory) = unsafe {
             let properties = self.handle.get_physical_device_properties(handle);
             if properties.api_version >= vk::API_VERSION_1_2 {
                 let mut properties2 = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
                 self.handle.get_physical_device_properties2(handle, &mut properties2);
             }
             let features = self.handle.get_physical_device_features(handle);
-            (properties, features, self.handle.get_physical_device_queue_family_properties(handle))
+            let families = self.handle.get_physical_device_queue_family_properties(handle);
+            (properties, features, families, self.handle.get_physical_device_memory_properties(handle))
         };
         let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         let family = families.iter().position(|f| f.queue_flags.contains(wanted)).unwrap_or(0) as u32;
@@ -225,6 +228,7 @@ impl Instance {
             refusal: device::check(&self.handle, handle, family).err().map(|e| e.to_string()),
             point_size: properties.limits.point_size_range[1],
             image_size: properties.limits.max_image_dimension2_d,
+            memory: device::largest_heap(&memory),
             timestamps: families.get(family as usize).is_some_and(|f| f.timestamp_valid_bits > 0),
             large_points: features.large_points != 0,
             slowed_by: self.tools(handle, properties.api_version),

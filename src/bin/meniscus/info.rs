@@ -24,7 +24,8 @@ pub fn run() -> Result<ExitCode, Box<dyn Error>> {
         line(format!("  {}", d.name))?;
         line(format!("    {}, {}, Vulkan {}", d.kind, d.driver, d.api))?;
         line(format!(
-            "    largest image {} px, largest point {} px (large points: {})",
+            "    {:.1} GB of memory, largest image {} px, largest point {} px (large points: {})",
+            d.memory as f64 * 1e-9,
             d.image_size,
             d.point_size,
             yes(d.large_points)
