@@ -226,6 +226,17 @@ impl Renderer {
         } else {
             self.needs(input.settings, input.debug)
         };
+        let mut block = input.camera.uniforms(input.settings, self.size, &space, bounds);
+        if let Some(p) = &input.positions {
+            // In the preparation's units; the extent pass moves the origin and goes on to radii.
+            let shift = input.camera.view.w_axis.truncate() * space::power_of_two(p.radius);
+            block.view.w_axis = shift.extend(1.0);
+        }
+        // Squares of distances are taken of it.
+        if !block.view.w_axis.is_finite() || block.view.w_axis.abs().max_element() > FARTHEST_EYE {
+            let remedy = format!("the eye is more than {FARTHEST_EYE:e} particle radii away: go nearer");
+            return Err(Error::parameter("camera view", input.camera.view, remedy));
+        }
         let Some(slot) = self.slots.get_mut(input.slot) else {
             return Err(Error::parameter("slot", input.slot, "use less than Host::frames_in_flight"));
         };
@@ -244,12 +255,6 @@ impl Renderer {
         }
         self.last_classes = classes;
 
-        let mut block = input.camera.uniforms(input.settings, self.size, &space, bounds);
-        if let Some(p) = &input.positions {
-            // In the preparation's units; the extent pass moves the origin and goes on to radii.
-            let shift = input.camera.view.w_axis.truncate() * space::power_of_two(p.radius);
-            block.view.w_axis = shift.extend(1.0);
-        }
         block.particles.x = needs.count;
         block.particles.z = self.limits.point_size as u32;
         block.particles.w = u32::from(input.settings.quads_only || self.limits.point_size <= 1.0);
@@ -418,6 +423,9 @@ fn check_memory(host: &Host, limits: &Limits, table: &Table, needs: &Needs) -> R
         Some(missing) => Err(Error::MemoryShort { needed, available: limits.memory, missing }),
     }
 }
+
+/// How far the eye may be, in particle radii.
+const FARTHEST_EYE: f32 = 1e12;
 
 /// No device asks for more alignment of a storage buffer's offset.
 const BINDING_ALIGNMENT: u64 = 256;

@@ -262,6 +262,9 @@ fn what_the_caller_gets_wrong_is_said() {
             let mut flat = case.clone();
             flat.camera.near = 0.0;
             assert!(refused(&input(&flat, 0, canvas.view)).contains("near plane"));
+            let mut far = case.clone();
+            far.camera.view.w_axis.x = 1e30;
+            assert!(refused(&input(&far, 0, canvas.view)).contains("particle radii away"));
             // Positions on the device. Nothing is recorded, so their buffer need not be there.
             let positions = DevicePositions::packed(vk::Buffer::null(), 10, 0.1);
             let far_too_many = u32::try_from(u64::from(u32::MAX) / 2).expect("it fits");
