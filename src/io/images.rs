@@ -103,7 +103,7 @@ fn decode(name: &Path, mut input: impl BufRead + Seek, frame: &Frame<'_>) -> Res
             png::read(input, frame)?
         } else if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
             exr::read(input, frame)?
-        } else if start.starts_with(b"#?RADIANCE") {
+        } else if [&b"#?RADIANCE"[..], b"#?RGBE"].iter().any(|mark| start.starts_with(mark)) {
             hdr::read(input, frame)?
         } else {
             return Err(Fault::Corrupt("its first bytes are of no format that is known here".into()));
