@@ -14,7 +14,7 @@ use image::{DynamicImage, ImageFormat};
 use map::{Fault, Frame};
 use std::{
     fs::File,
-    io::{BufRead, BufReader, Cursor, ErrorKind, Seek},
+    io::{BufRead, BufReader, Cursor, ErrorKind, Read, Seek},
     path::{Path, PathBuf},
 };
 
@@ -77,6 +77,19 @@ pub fn read_environment_within(path: &Path, needed: Option<u32>, budget: &Budget
     let metadata = file.metadata().map_err(io)?;
     if metadata.is_dir() {
         return Err(io(ErrorKind::IsADirectory.into()));
+    }
+    if !metadata.is_file() {
+        // How much a pipe or device gives is not known before, and limits follow from it.
+        let most = budget.bytes() / 4;
+        let mut bytes = Vec::new();
+        file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(io)?;
+        let file = bytes.len() as u64;
+        if file > most {
+            let what = "what this pipe or device gives".into();
+            let source = OverBudget { what, needed: file, allowed: most, file, budget: *budget };
+            return Err(ImageError::TooLarge { path: path.into(), source });
+        }
+        return environment_from_bytes(path, &bytes, needed, budget);
     }
     let frame = Frame { budget, file: metadata.len(), needed };
     decode(path, BufReader::with_capacity(1 << 16, file), &frame)
