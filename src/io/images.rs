@@ -14,7 +14,7 @@ use image::{DynamicImage, ImageFormat};
 use map::{Fault, Frame};
 use std::{
     fs::File,
-    io::{BufRead, BufReader, Cursor, ErrorKind, Seek},
+    io::{BufRead, BufReader, Cursor, ErrorKind, Read, Seek},
     path::{Path, PathBuf},
 };
 
@@ -78,6 +78,19 @@ pub fn read_environment_within(path: &Path, needed: Option<u32>, budget: &Budget
     if metadata.is_dir() {
         return Err(io(ErrorKind::IsADirectory.into()));
     }
+    if !metadata.is_file() {
+        // How much a pipe or device gives is not known before, and limits follow from it.
+        let most = budget.bytes() / 4;
+        let mut bytes = Vec::new();
+        file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(io)?;
+        let file = bytes.len() as u64;
+        if file > most {
+            let what = "what this pipe or device gives".into();
+            let source = OverBudget { what, needed: file, allowed: most, file, budget: *budget };
+            return Err(ImageError::TooLarge { path: path.into(), source });
+        }
+        return environment_from_bytes(path, &bytes, needed, budget);
+    }
     let frame = Frame { budget, file: metadata.len(), needed };
     decode(path, BufReader::with_capacity(1 << 16, file), &frame)
 }
@@ -103,7 +116,7 @@ fn decode(name: &Path, mut input: impl BufRead + Seek, frame: &Frame<'_>) -> Res
             png::read(input, frame)?
         } else if start.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
             exr::read(input, frame)?
-        } else if start.starts_with(b"#?RADIANCE") {
+        } else if [&b"#?RADIANCE"[..], b"#?RGBE"].iter().any(|mark| start.starts_with(mark)) {
             hdr::read(input, frame)?
         } else {
             return Err(Fault::Corrupt("its first bytes are of no format that is known here".into()));

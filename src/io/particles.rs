@@ -181,9 +181,21 @@ pub fn read_within(path: &Path, budget: &Budget) -> Result<ParticleFile, ReadErr
     let stated = file.metadata().map_err(missing)?.len();
     let too_large = |source| ReadError::TooLarge { path: path.into(), source };
     Ledger::new(*budget, stated).map_err(too_large)?;
-    // Devices and pipes state no size: what is read is what counts.
+    // Devices and pipes state no size, and may have no end. What is made of their bytes needs room too.
+    let most = if stated == 0 { budget.bytes() / 2 } else { budget.bytes() };
     let mut bytes = Vec::with_capacity(stated as usize);
-    file.take(budget.bytes().saturating_add(1)).read_to_end(&mut bytes).map_err(missing)?;
+    file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(missing)?;
+    let file = bytes.len() as u64;
+    if stated == 0 && file > most {
+        let what = "what this pipe or device gives, with positions as large,".into();
+        return Err(too_large(OverBudget {
+            what,
+            needed: 2 * file,
+            allowed: budget.allowance(file),
+            file,
+            budget: *budget,
+        }));
+    }
     read_bytes(path, &bytes, budget)
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageFormat, RgbImage};
 use meniscus::io::Budget;
-use meniscus::io::images::{ImageError, environment_from_bytes, read_environment, reduction};
+use meniscus::io::images::{ImageError, environment_from_bytes, read_environment, read_environment_within, reduction};
 use meniscus::twin::optics::decode_srgb;
 use meniscus::{Equirect, EquirectBuilder};
 
@@ -197,4 +197,26 @@ fn failed_reads_say_what_to_do() {
     assert!(text.contains("a\\u{1b}.png: cannot be read") && text.contains("; check the path"), "{text}");
     let text = read_environment(folder.path()).expect_err("a folder").to_string();
     assert!(text.contains("; name one image in it"), "{text}");
+}
+
+#[test]
+#[cfg(unix)]
+fn maps_come_through_pipes_too() {
+    let mut bytes = Cursor::new(Vec::new());
+    DynamicImage::ImageRgb32F(image::Rgb32FImage::from_pixel(64, 32, image::Rgb([0.5; 3])))
+        .write_to(&mut bytes, ImageFormat::OpenExr)
+        .expect("encoded");
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("a.exr");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+    let writer = {
+        let pipe = pipe.clone();
+        std::thread::spawn(move || std::fs::write(pipe, bytes.into_inner()))
+    };
+    assert_eq!(read_environment(&pipe).expect("a map").size(), [64, 32]);
+    writer.join().expect("joined").expect("written");
+    let endless = folder.path().join("b.exr");
+    std::os::unix::fs::symlink("/dev/zero", &endless).expect("a link");
+    let error = read_environment_within(&endless, None, &Budget::new(8 << 20)).expect_err("no end");
+    assert!(matches!(error, ImageError::TooLarge { .. }), "{error}");
 }

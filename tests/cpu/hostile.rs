@@ -280,3 +280,16 @@ fn headers_of_any_length_give_short_messages() {
     let error = bytes(&name, "1").expect_err("unknown").to_string();
     assert!(error.starts_with("a\\u{1b}.yyy") && !error.contains('\x1b'), "{error}");
 }
+
+#[test]
+#[cfg(unix)]
+fn a_device_without_end_is_left_at_half_of_the_cap() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.xyz");
+    std::os::unix::fs::symlink("/dev/zero", &path).unwrap();
+    let budget = Budget::new(8 << 20);
+    match read_within(&path, &budget) {
+        Err(ReadError::TooLarge { source, .. }) => assert_eq!(source.file, budget.bytes() / 2 + 1),
+        other => panic!("{other:?}"),
+    }
+}

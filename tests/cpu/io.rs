@@ -351,7 +351,7 @@ fn rejects_bad_legacy_vtk() {
     assert_malformed("a.vtk", "solid stl\n");
     let text = String::from_utf8_lossy(&whole[..90]).replace("POINTS 3", "POINTS 4000000000");
     assert_malformed("a.vtk", text);
-    assert!(matches!(fail_as("a.vtk", vtk("POLYDATA", "int", &positions, b"")), ReadError::WrongShape { .. }));
+    assert!(matches!(fail_as("a.vtk", vtk("POLYDATA", "long", &positions, b"")), ReadError::WrongShape { .. }));
     let image = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\n";
     let error = fail_as("a.vtk", image);
     assert!(matches!(&error, ReadError::NoPositions { found, .. } if found.contains("STRUCTURED_POINTS")), "{error:?}");

@@ -3,6 +3,8 @@
 #[cfg(feature = "io")]
 mod environment;
 #[cfg(feature = "io")]
+mod forms;
+#[cfg(feature = "io")]
 mod hostile;
 mod house;
 #[cfg(feature = "io")]

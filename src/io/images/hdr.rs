@@ -11,7 +11,8 @@ use super::map::{Fault, Frame, Target};
 const HEADER: u64 = 1 << 16;
 
 pub(super) fn read(mut input: impl BufRead + Seek, frame: &Frame<'_>) -> Result<Target, Fault> {
-    let (width, height) = HdrDecoder::new((&mut input).take(HEADER))?.dimensions();
+    // What the decoder calls strict refuses `#?RGBE`, the other first line that there is.
+    let (width, height) = HdrDecoder::new_nonstrict((&mut input).take(HEADER))?.dimensions();
     let mut target = frame.target(width, height)?;
     // The decoder reads all of an image or nothing, but takes no byte more than that: so each row is an image of its own.
     let header = format!("#?RADIANCE\n\n-Y 1 +X {width}\n");

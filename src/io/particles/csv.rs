@@ -104,7 +104,7 @@ impl Columns {
         source.no_positions("columns x, y, z expected", list(record))
     }
 
-    /// The first names that are the same but for their axis count, `x` or `Points:0` alike.
+    /// `x`, `y` and `z` count; else the first names that are the same but for their axis, `px` or `Points:0` alike.
     fn named(source: &Source<'_>, header: &StringRecord) -> Result<Columns, ReadError> {
         let names: Vec<Option<(String, usize, bool)>> = header.iter().map(axis).collect();
         let place = |stem: &str, axis: usize, digits: bool| {
@@ -120,6 +120,7 @@ impl Columns {
                 stems.push((stem, *digits));
             }
         }
+        stems.sort_by_key(|(stem, _)| !stem.is_empty());
         let whole = stems.into_iter().find_map(|(stem, digits)| {
             let found = [0, 1, 2].map(|axis| place(stem, axis, digits));
             found.iter().all(Option::is_some).then(|| found.map(Option::unwrap_or_default))

@@ -85,7 +85,7 @@ pub(super) fn number(source: &Source<'_>, at: At, word: &str, place: &str) -> Re
 
 /// Tells the columns of a file without names of columns: whether all of it could be decimal commas taken for separators.
 ///
-/// `0,637,0,270,0,041` has six integers or three decimals. Positions that are all integers, followed by integers, with
+/// `0,637,0,270,0,041` has six integers or three decimals, and so may exponents follow. Positions that are all integers, followed by integers, with
 /// nothing but commas between, are rare enough to ask for a header.
 #[derive(Default)]
 pub(super) struct CommaCheck {
@@ -94,7 +94,7 @@ pub(super) struct CommaCheck {
 
 impl CommaCheck {
     pub(super) fn field(&mut self, field: &str) {
-        self.no_integer |= !field.is_empty() && field.bytes().any(|b| !b.is_ascii_digit() && !b"+-".contains(&b));
+        self.no_integer |= !field.is_empty() && field.bytes().any(|b| !b.is_ascii_digit() && !b"+-eE".contains(&b));
     }
 
     pub(super) fn finish(&self, source: &Source<'_>, at: At, columns: usize) -> Result<(), ReadError> {

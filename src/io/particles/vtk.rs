@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
+use super::numbers::Kind;
 use super::source::{Source, find};
-use super::vtk_sections::Sections;
+use super::vtk_sections::{Sections, legacy};
 use super::{At, ParticleFile, ReadError};
 use crate::io::quote::quote;
 
@@ -95,8 +96,11 @@ impl Walk<'_> {
                     return Err(bad("a second POINTS"));
                 }
                 let kind = kind(2);
-                if !matches!(kind.as_str(), "float" | "double") {
-                    return Err(source.wrong_shape("POINTS", format!("of type `{}`", quote(&kind)), "float or double"));
+                // How long a packed `long` is depends on its writer's machine.
+                let known = if self.sections.ascii { legacy(&kind) } else { Kind::named(&kind) };
+                if known.is_none() {
+                    let found = format!("of type `{}`", quote(&kind));
+                    return Err(source.wrong_shape("POINTS", found, "float, double or integers of a known size"));
                 }
                 self.positions = Some(self.sections.points(number(1)?, &kind)?.finish());
             }
@@ -139,14 +143,19 @@ impl Walk<'_> {
             "TEXTURE_COORDINATES" => self.sections.skip(&keyword, &kind(3), tuples.saturating_mul(number(2)?))?,
             "GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS" => self.sections.skip(&keyword, &kind(2), tuples)?,
             "FIELD" => {
-                for _ in 0..number(2)? {
+                let mut left = number(2)?;
+                while left > 0 {
+                    let at = self.sections.at;
                     let Some(line) = self.sections.line() else {
                         return Err(bad("the file ends within this FIELD"));
                     };
+                    if self.metadata(&line) {
+                        continue;
+                    }
+                    left -= 1;
                     let words: Vec<&str> = line.split_ascii_whitespace().collect();
                     let [name, components, tuples, kind] = words[..] else {
-                        // As METADATA after an array.
-                        return Ok(self.metadata(&line));
+                        return self.find_next(at);
                     };
                     let (Ok(components), Ok(tuples)) = (components.parse(), tuples.parse()) else {
                         return Err(source.malformed(self.sections.here(), format!("no array: `{}`", quote(&line))));
@@ -159,27 +168,26 @@ impl Walk<'_> {
             "X_COORDINATES" | "Y_COORDINATES" | "Z_COORDINATES" => {
                 self.sections.skip(&keyword, &kind(2), number(1)?)?;
             }
-            _ if self.positions.is_none() => {
-                // Something that is not known here; what is wanted may still follow.
-                let next = find(&source.bytes[at..], b"\nPOINTS ");
-                self.sections.at = next.map_or(source.bytes.len(), |next| at + next);
-            }
             // Another keyword is only unknown; what is none is a part of POINTS.
             _ if self.after_points
                 && !(keyword.len() > 3 && keyword.bytes().all(|b| b.is_ascii_uppercase() || b == b'_')) =>
             {
                 return Err(bad("a keyword expected after POINTS, which are more than promised"));
             }
-            _ => return self.find_point_data(at),
+            _ => return self.find_next(at),
         }
         self.after_points = keyword == "POINTS";
         Ok(true)
     }
 
-    /// Goes on behind an array of which the length is not known.
-    fn find_point_data(&mut self, at: usize) -> Result<bool, ReadError> {
+    /// Goes on behind what is not known here: with POINTS or, after them, POINT_DATA.
+    fn find_next(&mut self, at: usize) -> Result<bool, ReadError> {
         let source = self.sections.source;
         let rest = &source.bytes[at..];
+        if self.positions.is_none() {
+            self.sections.at = find(rest, b"\nPOINTS ").map_or(source.bytes.len(), |next| at + next);
+            return Ok(true);
+        }
         if let Some(next) = find(rest, b"\nPOINT_DATA ") {
             self.sections.at = at + next;
             return Ok(true);

@@ -69,6 +69,9 @@ impl<'a> Sections<'a> {
 
     /// Passes over an array. The length of one of an unknown type is unknown: what comes next is then no keyword.
     pub(super) fn skip(&mut self, name: &str, kind: &str, count: u64) -> Result<(), ReadError> {
+        if matches!(kind, "string" | "utf8_string") {
+            return self.strings(name, count);
+        }
         if self.ascii {
             return self.words(name, count, |_, _, _| Ok(()));
         }
@@ -78,6 +81,28 @@ impl<'a> Sections<'a> {
             None if kind == "bit" => self.packed(name, Kind::U8, count.div_ceil(8)).map(drop),
             None => Ok(()),
         }
+    }
+
+    /// Passes over strings: each a line, or packed behind its length, of which the first two bits say how long that is.
+    fn strings(&mut self, name: &str, count: u64) -> Result<(), ReadError> {
+        for found in 0..count {
+            let rest = self.rest();
+            let length = if self.ascii {
+                rest.iter().position(|b| *b == b'\n').map(|end| end + 1)
+            } else {
+                rest.first().and_then(|first| {
+                    let size = 1 << (3 - (first >> 6));
+                    let bytes = rest[1..].get(..size - 1)?;
+                    let length = bytes.iter().fold(u64::from(first & 0x3f), |n, b| n << 8 | u64::from(*b));
+                    usize::try_from(length).ok()?.checked_add(size)
+                })
+            };
+            match length.filter(|length| *length <= rest.len()) {
+                Some(length) => self.at += length,
+                None => return Err(self.ends(name, count, found)),
+            }
+        }
+        Ok(())
     }
 
     fn packed(&mut self, name: &str, kind: Kind, count: u64) -> Result<&'a [u8], ReadError> {
@@ -111,7 +136,7 @@ impl<'a> Sections<'a> {
     }
 
     fn ends(&self, name: &str, count: u64, found: u64) -> ReadError {
-        let detail = format!("the file ends within {name}: {count} numbers promised, {found} found");
+        let detail = format!("the file ends within {name}: {count} entries promised, {found} found");
         self.source.malformed(At::Byte(self.source.bytes.len() as u64), detail)
     }
 

@@ -152,12 +152,32 @@ impl Pieces {
     }
 }
 
-/// The text before the next tag.
+/// The text up to the end of the element, without comments in it and without what is inside other elements in it.
 fn content<'a>(source: &Source<'_>, reader: &mut Reader<&'a [u8]>) -> Result<Cow<'a, [u8]>, ReadError> {
-    let at = At::Byte(reader.buffer_position());
-    match reader.read_event().map_err(|error| source.malformed(at, xml(&error)))? {
-        Event::Text(content) => Ok(content.into_inner()),
-        _ => Ok(Cow::Borrowed(&[])),
+    let (mut text, mut depth) = (Cow::Borrowed(&[][..]), 0);
+    loop {
+        let at = At::Byte(reader.buffer_position());
+        let part = match reader.read_event().map_err(|error| source.malformed(at, xml(&error)))? {
+            Event::Text(part) if depth == 0 => part.into_inner(),
+            Event::CData(part) if depth == 0 => part.into_inner(),
+            Event::Start(_) => {
+                depth += 1;
+                continue;
+            }
+            Event::End(_) if depth > 0 => {
+                depth -= 1;
+                continue;
+            }
+            Event::End(_) | Event::Eof => return Ok(text),
+            _ => continue,
+        };
+        if text.trim_ascii().is_empty() {
+            text = part;
+        } else {
+            let mut joined: Vec<u8> = source.room((text.len() + part.len()) as u64, "an array")?;
+            joined.extend([text, part].iter().flat_map(|part| part.iter()));
+            text = Cow::Owned(joined);
+        }
     }
 }
 

@@ -62,6 +62,11 @@ impl Array<'_> {
                     count(super::text::number(source, self.at, &word, "")?);
                 }
             }
+            "binary" if self.text.iter().any(u8::is_ascii_whitespace) => {
+                let mut joined: Vec<u8> = source.room(self.text.len() as u64, "an array")?;
+                joined.extend(self.text.iter().filter(|b| !b.is_ascii_whitespace()));
+                self.decode(source, &joined, true, encoding, &mut count)?;
+            }
             "binary" => self.decode(source, self.text, true, encoding, &mut count)?,
             "appended" => {
                 let data = encoding.appended.and_then(|data| data.get(self.offset..));

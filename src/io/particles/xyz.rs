@@ -42,6 +42,11 @@ fn lines(source: &Source<'_>, content: &[u8]) -> Result<ParticleFile, ReadError>
         let line = line.split('#').next().unwrap_or_default();
         table.line(source, At::Line(number), line, |v| triples.push(v))?;
     }
+    if let Some((number, _)) = count.filter(|_| table.atoms && table.columns > 3 && !table.element) {
+        let detail = "a count, as in chemistry, and whole numbers in the first column: they may stand for elements";
+        let remedy = "name the elements by letters, or leave out the count and the comment";
+        return Err(source.malformed_but(At::Line(number), detail, remedy));
+    }
     if table.commas {
         table.check.finish(source, table.first, table.columns)?;
     }
@@ -60,13 +65,22 @@ struct Table {
     first: At,
     columns: usize,
     element: bool,
+    /// Whether each line so far begins with what may be an atomic number.
+    atoms: bool,
     commas: bool,
     check: CommaCheck,
 }
 
 impl Default for Table {
     fn default() -> Self {
-        Table { first: At::Unknown, columns: 0, element: false, commas: false, check: CommaCheck::default() }
+        Table {
+            first: At::Unknown,
+            columns: 0,
+            element: false,
+            atoms: true,
+            commas: false,
+            check: CommaCheck::default(),
+        }
     }
 }
 
@@ -104,6 +118,7 @@ impl Table {
                 "give every line the same columns",
             ));
         }
+        self.atoms &= words().next().is_some_and(|word| word.bytes().all(|b| b.is_ascii_digit()));
         for word in words().skip(self.element.into()).take(3) {
             each(text::number(source, at, word, "")?);
         }
