@@ -108,6 +108,7 @@ void main() {
             float t;
             int side;
             int found = find_exit(trace(x, dir), cls, came_from, t, side);
+            t = max(t, 0.0); // the last step onto a wall at hand may round to before it
             if (found == OUTCOME_PAST_JUMP || found == OUTCOME_OTHER_WALL) {
                 doubt = doubt == OUTCOME_HIT ? found : doubt;
                 found = OUTCOME_HIT;

@@ -201,7 +201,7 @@ impl Camera {
                 0.0,
             ),
             search: Vec4::new(converged, accepted, jump, settings.ior),
-            absorption: (settings.absorption * radius).extend(0.0),
+            absorption: (settings.absorption * radius).min(Vec3::MAX).extend(0.0), // infinite times nothing is no number
             bounds_min: low.extend(0.0),
             bounds_max: high.extend(0.0),
             scene: Vec4::ZERO,

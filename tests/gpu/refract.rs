@@ -225,3 +225,21 @@ fn random_clouds_are_walked_as_their_twin_walks_them() {
         }
     });
 }
+
+/// Liquid too dark to see through: black, and no pixel that is no number, even where a wall lies at hand.
+#[cfg(feature = "io")]
+#[test]
+fn what_absorbs_everything_is_black() {
+    let size = [1024, 768];
+    let dam_break = crate::splat::dam_break();
+    let settings = Settings { absorption: Vec3::new(1e30, 3e38, 0.0), sigma: 180.0, ..Settings::default() };
+    let aspect = size[0] as f32 / size[1] as f32;
+    let projection = glam::camera::rh::proj::vulkan::perspective_infinite(45f32.to_radians(), aspect, 0.01);
+    let camera = meniscus::Camera { projection, ..dam_break.camera };
+    let case = Case { settings, size, camera, ..dam_break.clone() };
+    each_driver(|driver| {
+        let shot = driver.shoot(&case);
+        let bad = shot.picture.iter().flatten().filter(|v| !v.is_finite()).count();
+        assert_eq!(bad, 0, "{}: values that are no numbers", driver.name);
+    });
+}
