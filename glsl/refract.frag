@@ -119,7 +119,7 @@ void main() {
             if (outcome == OUTCOME_HIT) n = sample_normal(cls, side, project(x + t * dir), smooth_here);
 #ifdef SCENE
             // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
-            float t_scene, gap = outcome == OUTCOME_HIT ? WETTED / max(abs(dot(dir, n)), 0.2) : 0.0;
+            float t_scene, gap = outcome == OUTCOME_HIT ? WETTED / max(abs(dot(dir, n)), WETTED_FLAT) : 0.0;
             if (meets_scene(in_view(x, dir, t + gap), t_scene, met)) {
                 t = t_scene;
                 outcome = OUTCOME_SCENE;

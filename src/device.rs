@@ -19,7 +19,8 @@ pub struct Host {
     pub queue_family: u32,
     /// The host's allocator, shared.
     pub allocator: Arc<Mutex<Allocator>>,
-    /// How many frames may be recorded before the first of them has completed; at least 1.
+    /// How many calls of [`crate::Renderer::record`] may be waiting for their frames to complete: frames in flight, times
+    /// views a frame; 1 to 256.
     pub frames_in_flight: u32,
     /// Whether the device was created with the `largePoints` feature. Without it everything is drawn as quads.
     pub large_points: bool,

@@ -41,7 +41,7 @@ impl Equirect {
         &self.texels
     }
 
-    /// The sky used when there is no map: a clear afternoon over a tiled floor that fades into haze, so that
+    /// A sky for those who have no map: a clear afternoon over a tiled floor that fades into haze, so that
     /// refraction has straight lines to bend. Made here, needs no file.
     pub fn procedural_sky() -> Equirect {
         let (width, height) = (2048u32, 1024u32);

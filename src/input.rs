@@ -1,6 +1,7 @@
 //! What the host gives for one frame: particles and camera, its own picture, and where the result goes.
 
 use crate::{
+    Error,
     prepare::DevicePositions,
     settings::{Camera, Settings},
 };
@@ -22,7 +23,8 @@ pub enum Background {
 /// An environment of the host's own, in place of [`Renderer::set_environment`](crate::Renderer::set_environment)'s.
 #[derive(Clone, Copy, Debug)]
 pub struct EnvironmentInput {
-    /// Linear light, infinitely far away, sampled in the fragment stage; mip level 0 is used.
+    /// Linear light, infinitely far away, sampled in the fragment stage; mip level 0 is used. Of any format that reads as
+    /// floats (float, UNORM or sRGB).
     pub view: vk::ImageView,
     /// Layout it is in, before and after.
     pub layout: vk::ImageLayout,
@@ -41,7 +43,8 @@ pub enum EnvironmentShape {
 }
 
 /// The host's opaque scene, rendered before the liquid at the same size and with the same camera. It hides liquid, is seen
-/// through it, and ends rays under water: liquid whose wall lies a few radii before an opaque surface touches it.
+/// through it, and ends rays under water. Liquid whose wall lies up to three and a half radii (across that wall) before an
+/// opaque surface touches it: simulated particles stop short of floors.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneInput {
     /// Linear colour, sampled in the fragment stage.
@@ -52,7 +55,8 @@ pub struct SceneInput {
     pub depth: vk::ImageView,
     /// Layout the depth is in, before and after.
     pub depth_layout: vk::ImageLayout,
-    /// Depth value where nothing was drawn: what is infinitely far away is seen there (see [`Background`]).
+    /// Depth value where nothing was drawn, 0 to 1: 1 with depths that grow away from the eye ([`Camera::look_at`]), 0 with
+    /// reversed ones. Compared for equality: what is infinitely far away is seen there (see [`Background`]).
     pub cleared_depth: f32,
 }
 
@@ -71,7 +75,7 @@ pub struct FrameInput<'a> {
     pub scene: Option<SceneInput>,
     /// What is seen where no liquid is.
     pub background: Background,
-    /// Host's own environment; without one that of [`Renderer::set_environment`](crate::Renderer::set_environment).
+    /// Host's own environment. One of the two is always needed; without this one it is that of [`Renderer::set_environment`](crate::Renderer::set_environment).
     pub environment: Option<EnvironmentInput>,
     /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it.
     pub eye_inside: bool,
@@ -85,7 +89,60 @@ pub struct FrameInput<'a> {
     pub neighbours: u32,
 }
 
+/// Layouts in which a shader may sample an image.
+fn can_be_sampled(layout: vk::ImageLayout) -> bool {
+    use vk::ImageLayout as L;
+    [
+        L::GENERAL,
+        L::SHADER_READ_ONLY_OPTIMAL,
+        L::READ_ONLY_OPTIMAL,
+        L::DEPTH_READ_ONLY_OPTIMAL,
+        L::DEPTH_STENCIL_READ_ONLY_OPTIMAL,
+        L::DEPTH_READ_ONLY_STENCIL_ATTACHMENT_OPTIMAL,
+    ]
+    .contains(&layout)
+}
+
+fn check_sampled(what: &'static str, view: vk::ImageView, layout: vk::ImageLayout) -> Result<(), Error> {
+    if view == vk::ImageView::null() {
+        return Err(Error::parameter(what, "null", "give an image view, or None for the whole"));
+    }
+    if !can_be_sampled(layout) {
+        return Err(Error::parameter(
+            what,
+            format!("in {layout:?}"),
+            "bring it into a layout in which it can be sampled",
+        ));
+    }
+    Ok(())
+}
+
 impl<'a> FrameInput<'a> {
+    /// What can be told of the host's handles without using them.
+    pub(crate) fn check_handles(&self) -> Result<(), Error> {
+        if self.output == vk::ImageView::null() {
+            return Err(Error::parameter("output", "null", "give the view that is to be drawn into"));
+        }
+        if let Some(e) = &self.environment {
+            check_sampled("environment", e.view, e.layout)?;
+        }
+        if let Some(s) = &self.scene {
+            check_sampled("scene colour", s.color, s.color_layout)?;
+            check_sampled("scene depth", s.depth, s.depth_layout)?;
+            if !(0.0..=1.0).contains(&s.cleared_depth) {
+                return Err(Error::parameter(
+                    "cleared depth",
+                    s.cleared_depth,
+                    "use 0 to 1, what the depth was cleared to",
+                ));
+            }
+        }
+        if self.positions.is_some_and(|p| p.count > 0 && p.buffer == vk::Buffer::null()) {
+            return Err(Error::parameter("buffer of positions", "null", "give the buffer that holds them"));
+        }
+        Ok(())
+    }
+
     /// A frame of the particles last given, before the environment alone; anything else by struct update.
     pub fn new(slot: usize, camera: &'a Camera, settings: &'a Settings, output: vk::ImageView) -> FrameInput<'a> {
         FrameInput {

@@ -67,8 +67,9 @@ impl Renderer {
             return Err(Error::parameter("output format", format!("{output:?}"), remedy));
         }
         host.check_attachment(output)?;
-        if host.frames_in_flight == 0 {
-            return Err(Error::parameter("frames in flight", 0, "use at least 1"));
+        if !(1..=MOST_SLOTS).contains(&host.frames_in_flight) {
+            let remedy = format!("use 1 to {MOST_SLOTS}");
+            return Err(Error::parameter("frames in flight", host.frames_in_flight, remedy));
         }
         let limits = host.limits();
         let mut renderer = Renderer {
@@ -190,8 +191,9 @@ impl Renderer {
     /// * The frame last recorded into `input.slot` has completed on the device.
     /// * The buffer of [`FrameInput::positions`] is alive until the frame has completed, holds what is said of it, has
     ///   usage `STORAGE_BUFFER`, and its earlier writes are visible to reads in compute shaders.
-    /// * The output and the scene's images are alive, of this size, in the stated layouts, and their earlier writes
-    ///   are available to the fragment and colour-attachment stages.
+    /// * The output, and what there is of the scene and of an environment of the host's, are alive until the frame has
+    ///   completed and in the stated layouts; output and scene are of this size. Their earlier writes are visible to
+    ///   sampling in fragment shaders, and those of the output to the colour-attachment stage.
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, input: &FrameInput) -> Result<(), Error> {
         input.settings.validate()?;
         input.camera.validate()?;
@@ -232,6 +234,7 @@ impl Renderer {
             let shift = input.camera.view.w_axis.truncate() * space::power_of_two(p.radius);
             block.view.w_axis = shift.extend(1.0);
         }
+        input.check_handles()?;
         // Squares of distances are taken of it.
         if !block.view.w_axis.is_finite() || block.view.w_axis.abs().max_element() > FARTHEST_EYE {
             let remedy = format!("the eye is more than {FARTHEST_EYE:e} particle radii away: go nearer");
@@ -304,7 +307,7 @@ impl Renderer {
     }
 
     /// Says that the frame last recorded into a slot will never run: its command buffer was reset, or is not submitted.
-    /// To be called before anything else is recorded. Waits for nothing.
+    /// To be called before the next frame is recorded into any slot, for each such frame, in any order. Waits for nothing.
     pub fn abandon(&mut self, slot: usize) {
         // Its barriers never run either: start again from new resources. Classes of an earlier frame are not kept.
         self.table.retire_all(&mut self.retired, self.frame + 1);
@@ -423,6 +426,9 @@ fn check_memory(host: &Host, limits: &Limits, table: &Table, needs: &Needs) -> R
         Some(missing) => Err(Error::MemoryShort { needed, available: limits.memory, missing }),
     }
 }
+
+/// Slots are made ahead, each with buffers and pools of its own.
+const MOST_SLOTS: u32 = 256;
 
 /// How far the eye may be, in particle radii.
 const FARTHEST_EYE: f32 = 1e12;

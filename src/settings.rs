@@ -120,12 +120,13 @@ pub struct Camera {
     /// near plane: farther than that it cuts liquid off, nearer it draws liquid before what the host's own scene can hold. An
     /// eye in the liquid sees from there on.
     pub near: f32,
-    /// World direction in which the environment map's +y points.
+    /// World direction in which the environment's +y points, after the shortest turn that brings one to the other.
     pub up: Vec3,
 }
 
 impl Camera {
-    /// A camera at `eye` that looks at `target`, `fov_y` radians high.
+    /// A camera at `eye` that looks at `target`, `fov_y` radians high. Its projection is infinite: the depth is 0 at `near`
+    /// and 1 infinitely far away, where a depth buffer is cleared to.
     pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, fov_y: f32, aspect: f32, near: f32) -> Camera {
         use glam::camera::rh;
         let projection = rh::proj::vulkan::perspective_infinite(fov_y, aspect, near);
@@ -148,17 +149,21 @@ impl Camera {
         let p = &self.projection;
         let perspective = p.is_finite()
             && p.row(3).abs_diff_eq(Vec4::new(0.0, 0.0, -1.0, 0.0), 1e-6)
-            && p.x_axis.x != 0.0
-            && p.y_axis.y != 0.0
+            && [p.x_axis.x, p.y_axis.y].iter().all(|scale| (1e-4..=1e6).contains(&scale.abs()))
+            && [p.z_axis.x, p.z_axis.y].iter().all(|shift| shift.abs() <= 1e6)
             && p.y_axis.x == 0.0
             && p.x_axis.y == 0.0;
         if !perspective {
-            return Err(Error::parameter("camera projection", p, "use a perspective projection with w = -z"));
+            return Err(Error::parameter(
+                "camera projection",
+                p,
+                "use a perspective projection with w = -z; its scales in x and y from 1e-4 to 1e6",
+            ));
         }
         if !(self.near > 0.0 && self.near.is_finite()) {
             return Err(Error::parameter("near plane", self.near, "use a finite distance above 0"));
         }
-        if !(self.up.length().is_finite() && self.up.length() > 0.0) {
+        if !(self.up.is_finite() && self.up != Vec3::ZERO) {
             return Err(Error::parameter("up", self.up, "use a finite direction that is not zero"));
         }
         Ok(())
@@ -188,7 +193,7 @@ impl Camera {
         let pixel = middle / to_pixel.x.abs().max(to_pixel.y.abs());
         let accepted = Self::ACCEPTED.max(Self::ACCEPTED_PIXELS * pixel).max(converged);
         let jump = Self::JUMP.max(Self::JUMP_PIXELS * pixel);
-        let to_up = Mat3::from_quat(glam::Quat::from_rotation_arc(self.up.normalize(), Vec3::Y));
+        let to_up = Mat3::from_quat(glam::Quat::from_rotation_arc(self.up.as_dvec3().normalize().as_vec3(), Vec3::Y));
         Frame {
             view,
             eye_to_env: Mat4::from_mat3(to_up * Mat3::from_mat4(self.view).transpose()),

@@ -128,6 +128,8 @@
 // it two and a half radii more.
 #define SCENE_BEHIND 0.01
 #define WETTED 3.5
+// Sine of the flattest ray for which that distance is measured across the wall.
+#define WETTED_FLAT 0.02
 
 // Tangent of the steepest surface (81 degrees against the view plane) for which strides are made short.
 #define STEEP 6.0

@@ -58,6 +58,11 @@ impl DevicePositions {
             let remedy = "use a multiple of 4 bytes, 12 at least and a mebibyte at most";
             return Err(Error::parameter("stride of positions", self.stride, remedy));
         }
+        let span = self.stride.checked_mul(u64::from(self.count)).and_then(|s| s.checked_add(self.offset));
+        if span.is_none_or(|end| end > 1 << 48) {
+            let remedy = "offset and stride times count lie beyond any buffer";
+            return Err(Error::parameter("offset of positions", self.offset, remedy));
+        }
         if self.keep_class_below.is_some_and(f32::is_nan) {
             return Err(Error::parameter("upper splash threshold", f32::NAN, "use a number"));
         }

@@ -11,7 +11,7 @@ use crate::{
     shader::{
         CLASS_BODY, CLASS_SPLASH, OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_OTHER_WALL,
         OUTCOME_REFLECTION_LIMIT, OUTCOME_SCENE, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH, SIDE_BACK,
-        SIDE_FRONT, WETTED,
+        SIDE_FRONT, WETTED, WETTED_FLAT,
     },
 };
 use glam::{DVec3, Mat3, Vec3, Vec4Swizzles};
@@ -113,7 +113,7 @@ pub fn walk(maps: &Maps, settings: &Settings, environment: &Equirect, pixel: [us
             let gap = match found {
                 true => {
                     let n = maps.sample_normal(class, exit.side, maps.project(ray.at(exit.t)));
-                    f64::from(WETTED) / dir.dot(n).abs().max(0.2)
+                    f64::from(WETTED) / dir.dot(n).abs().max(f64::from(WETTED_FLAT))
                 }
                 false => 0.0,
             };

@@ -241,6 +241,45 @@ fn an_eye_inside_sees_the_scene_through_the_liquid() {
     }
 }
 
+/// A floor just below the liquid, seen from within down to two degrees: wet, however flat the ray.
+#[test]
+fn a_floor_is_wet_at_flat_angles_too() {
+    let slab = Ellipsoid { center: Vec3::ZERO, axes: Mat3::from_diagonal(Vec3::new(30.0, 0.1, 30.0)) };
+    let eye = Vec3::new(0.0, 0.05, 2.0);
+    let camera = view(eye, eye + Vec3::new(0.0, -0.08, -1.0), 15.0);
+    let mut case = case(RADIUS, &[], &[slab], camera, settings(2, 0));
+    case.eye_inside = true;
+    let ray = |x: u32, y: u32| {
+        let p = camera.projection.as_dmat4();
+        let at = |v: u32, size: u32| (f64::from(v) + 0.5) / f64::from(size) * 2.0 - 1.0;
+        DVec3::new(at(x, SIZE[0]) / p.x_axis.x, at(y, SIZE[1]) / p.y_axis.y, -1.0)
+    };
+    let to_world = Mat3::from_mat4(camera.view).as_dmat3().transpose();
+    // Two radii below the lowest part of the liquid.
+    let floor = -0.1 - 2.0 * f64::from(RADIUS);
+    let depth_at = |x, y| {
+        let down = (to_world * ray(x, y)).y;
+        if down < 0.0 { (floor - 0.05) / down } else { f64::INFINITY }
+    };
+    let painted = painted(SIZE, depth_at);
+    each_driver(|driver| {
+        let scene = HostScene::new(driver.gpu(), &camera, SIZE, &painted);
+        let shot = driver.shoot_before(&case, scene.input(), Background::Environment);
+        let (mut seen, mut flat, mut dry) = (0, 0, 0);
+        for p in pixels(&case, &shot) {
+            // Two degrees and more, and where the slab is as thick as in its middle.
+            if p.dir.y > -0.035 || (floor - 0.05) / p.dir.y > 4.5 {
+                continue;
+            }
+            seen += 1;
+            flat += usize::from(p.dir.y > -0.1);
+            dry += usize::from(p.outcome != OUTCOME_SCENE);
+        }
+        println!("{}: {dry} of {seen} dry, {flat} flatter than 6 degrees", driver.name);
+        assert!(flat > 5000 && dry * 100 <= seen, "{}: {dry} of {seen} dry, {flat} flat", driver.name);
+    });
+}
+
 /// Boxes among, before and behind droplets and a body, some of them half in it, and the host's sky beside them.
 #[test]
 fn random_scenes_are_met_as_the_twin_meets_them() {

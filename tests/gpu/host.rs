@@ -265,11 +265,27 @@ fn what_the_caller_gets_wrong_is_said() {
             let mut far = case.clone();
             far.camera.view.w_axis.x = 1e30;
             assert!(refused(&input(&far, 0, canvas.view)).contains("particle radii away"));
+            assert!(refused(&input(&case, 0, vk::ImageView::null())).contains("output is null"));
+            let read = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+            let scene = |color, color_layout, cleared_depth| {
+                let scene = SceneInput { color, color_layout, depth: canvas.view, depth_layout: read, cleared_depth };
+                FrameInput { scene: Some(scene), ..input(&case, 0, canvas.view) }
+            };
+            assert!(refused(&scene(vk::ImageView::null(), read, 1.0)).contains("scene colour is null"));
+            assert!(
+                refused(&scene(canvas.view, vk::ImageLayout::UNDEFINED, 1.0)).contains("scene colour is in UNDEFINED")
+            );
+            assert!(refused(&scene(canvas.view, read, f32::NAN)).contains("cleared depth is NaN"));
+            let mut narrow = case.clone();
+            narrow.camera.projection.x_axis.x = 1e12;
+            assert!(refused(&input(&narrow, 0, canvas.view)).contains("camera projection"));
             // Positions on the device. Nothing is recorded, so their buffer need not be there.
             let positions = DevicePositions::packed(vk::Buffer::null(), 10, 0.1);
             let far_too_many = u32::try_from(u64::from(u32::MAX) / 2).expect("it fits");
             for (wrong, word) in [
+                (positions, "buffer of positions is null"),
                 (DevicePositions { offset: 6, ..positions }, "offset of positions is 6"),
+                (DevicePositions { offset: u64::MAX & !3, ..positions }, "beyond any buffer"),
                 (DevicePositions { stride: 8, ..positions }, "stride of positions is 8"),
                 (DevicePositions { stride: 13, ..positions }, "stride of positions is 13"),
                 (DevicePositions { radius: -1.0, ..positions }, "particle radius is -1"),
