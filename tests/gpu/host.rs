@@ -285,7 +285,7 @@ fn what_the_caller_gets_wrong_is_said() {
             for (wrong, word) in [
                 (positions, "buffer of positions is null"),
                 (DevicePositions { offset: 6, ..positions }, "offset of positions is 6"),
-                (DevicePositions { offset: u64::MAX & !3, ..positions }, "beyond any buffer"),
+                (DevicePositions { offset: u64::MAX - 3, ..positions }, "beyond any buffer"),
                 (DevicePositions { stride: 8, ..positions }, "stride of positions is 8"),
                 (DevicePositions { stride: 13, ..positions }, "stride of positions is 13"),
                 (DevicePositions { radius: -1.0, ..positions }, "particle radius is -1"),
