@@ -173,10 +173,9 @@ void main() {
     }
 #ifdef SCENE
     if (outcome == OUTCOME_SCENE) color += light * scene_light(met);
-    else color += light * background(x, dir);
-#else
-    color += light * background(x, dir);
+    else
 #endif
+    color += light * background(x, dir);
     int pattern = second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + second;
     finish(color, pattern, outcome == OUTCOME_HIT ? doubt : outcome, hits, length_inside, dir, flipped);
 }

@@ -20,7 +20,7 @@ pub enum Background {
     Host,
 }
 
-/// An environment of the host's own, in place of [`Renderer::set_environment`](crate::Renderer::set_environment)'s.
+/// An environment of the host's own, in place of [`crate::Renderer::set_environment`]'s.
 #[derive(Clone, Copy, Debug)]
 pub struct EnvironmentInput {
     /// Linear light, infinitely far away, sampled in the fragment stage; mip level 0 is used. Of any format that reads as
@@ -69,23 +69,25 @@ pub struct FrameInput<'a> {
     pub camera: &'a Camera,
     /// Smoothing and optics.
     pub settings: &'a Settings,
-    /// Positions on the device, to be prepared in this frame and drawn instead of [`Renderer::set_particles`](crate::Renderer::set_particles)'s.
+    /// Positions on the device, to be prepared in this frame and drawn instead of [`crate::Renderer::set_particles`]'s.
     pub positions: Option<DevicePositions>,
     /// Host's opaque scene, if there is one.
     pub scene: Option<SceneInput>,
     /// What is seen where no liquid is.
     pub background: Background,
-    /// Host's own environment. One of the two is always needed; without this one it is that of [`Renderer::set_environment`](crate::Renderer::set_environment).
+    /// Host's own environment. One of the two is always needed; without this one it is that of
+    /// [`crate::Renderer::set_environment`].
     pub environment: Option<EnvironmentInput>,
     /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it.
     pub eye_inside: bool,
-    /// Output, of the format given to [`Renderer::new`](crate::Renderer::new) and the size given to [`Renderer::resize`](crate::Renderer::resize), in
+    /// Output, of the format given to [`crate::Renderer::new`] and the size given to [`crate::Renderer::resize`], in
     /// `COLOR_ATTACHMENT_OPTIMAL` before and after.
     pub output: vk::ImageView,
-    /// Also write what each walk met into [`Id::Walk`](crate::targets::Id::Walk) and [`Id::Direction`](crate::targets::Id::Direction), for dumps and statistics.
+    /// Also write what each walk met into [`crate::targets::Id::Walk`] and [`crate::targets::Id::Direction`], for dumps and
+    /// statistics.
     pub debug: bool,
-    /// Where positions are prepared on the device, also list so many neighbours of every particle in [`Id::Neighbours`](crate::targets::Id::Neighbours):
-    /// for each its index, how many there are, and the indices of the first of them; 0 lists none. For tests and dumps.
+    /// Where positions are prepared on the device, also list so many neighbours of every particle in
+    /// [`crate::targets::Id::Neighbours`]: for each its index, how many there are, and the indices of the first of them; 0 lists none. For tests and dumps.
     pub neighbours: u32,
 }
 

@@ -1,7 +1,7 @@
 //! A colour image of the host's.
 
 use super::{Gpu, HostError, vulkan};
-use crate::access::Barrier;
+use crate::{Error, access::Barrier};
 use ash::vk;
 use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
@@ -91,15 +91,24 @@ impl<'a> Canvas<'a> {
 
     /// Fills it with pixels, row by row, and leaves it in a layout.
     pub fn write(&self, bytes: &[u8], layout: vk::ImageLayout) -> Result<(), HostError> {
+        if bytes.len() as u64 != self.bytes() {
+            let remedy = format!("give all {} bytes of the image", self.bytes());
+            return Err(Error::parameter("pixels", format!("{} bytes", bytes.len()), remedy).into());
+        }
         let upload = super::Upload::new(self.gpu, bytes)?;
         self.gpu.run(|cmd| {
             let to = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
             self.transition(cmd, vk::ImageLayout::UNDEFINED, to);
-            // SAFETY: `cmd` is recording; the buffer holds the whole image (or the copy would be refused above).
+            // SAFETY: `cmd` is recording; the buffer holds the whole image.
             unsafe { self.gpu.device.cmd_copy_buffer_to_image(cmd, upload.buffer, self.image, to, &[self.whole()]) };
             self.transition(cmd, to, layout);
             Ok(())
         })
+    }
+
+    /// Bytes of all pixels, of every face.
+    fn bytes(&self) -> u64 {
+        u64::from(self.size[0]) * u64::from(self.size[1]) * u64::from(self.faces) * self.texel
     }
 
     fn whole(&self) -> vk::BufferImageCopy {
@@ -111,8 +120,7 @@ impl<'a> Canvas<'a> {
 
     /// The pixels, row by row, after a frame that left them in `COLOR_ATTACHMENT_OPTIMAL`.
     pub fn read(&self) -> Result<Vec<u8>, HostError> {
-        let bytes = u64::from(self.size[0]) * u64::from(self.size[1]) * self.texel;
-        self.gpu.read_back(bytes, |cmd, buffer| {
+        self.gpu.read_back(self.bytes(), |cmd, buffer| {
             self.transition(cmd, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
             // SAFETY: `cmd` is recording; the buffer holds the whole image.
             unsafe {
