@@ -1,44 +1,17 @@
 //! Compiles glsl/ to SPIR-V, and makes Rust of what both sides share: block layouts and constants from
-//! glsl/include/shared.glsl, and each shader's bindings as reflected from its SPIR-V.
+//! glsl/include/shared.glsl, and each shader's bindings and constants as reflected from its SPIR-V.
 
-use std::{env, fmt::Write as _, fs, path::Path};
+use std::{
+    env,
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
 
 #[path = "build/reflect.rs"]
 mod reflect;
 #[path = "build/shared.rs"]
 mod shared;
-
-/// Rust constant, source file, macros it is compiled with.
-const SHADERS: &[(&str, &str, &[&str])] = &[
-    ("EXTENT_REDUCE_COMP", "extent.comp", &["REDUCE"]),
-    ("EXTENT_PLAN_COMP", "extent.comp", &["PLAN"]),
-    ("SORT_COUNT_COMP", "sort.comp", &["COUNT"]),
-    ("SORT_SCAN_COMP", "sort.comp", &["SCAN"]),
-    ("SORT_SCATTER_COMP", "sort.comp", &["SCATTER"]),
-    ("SORT_GATHER_COMP", "sort.comp", &["GATHER"]),
-    ("SHAPE_COMP", "shape.comp", &[]),
-    ("SHAPE_NEIGHBOURS_COMP", "shape.comp", &["NEIGHBOURS"]),
-    ("OCCLUDE_COMP", "occlude.comp", &[]),
-    ("CULL_COMP", "cull.comp", &[]),
-    ("COMPACT_COUNT_COMP", "compact.comp", &["COUNT"]),
-    ("COMPACT_SCAN_COMP", "compact.comp", &["SCAN"]),
-    ("COMPACT_SCATTER_COMP", "compact.comp", &["SCATTER"]),
-    ("SPLAT_POINTS_VERT", "splat.vert", &[]),
-    ("SPLAT_QUADS_VERT", "splat.vert", &["QUADS"]),
-    ("SPLAT_FRAG", "splat.frag", &[]),
-    ("PLANE_FIT_COMP", "plane_fit.comp", &[]),
-    ("NORMALS_COMP", "normals.comp", &[]),
-    ("TILES_COMP", "tiles.comp", &[]),
-    ("REFRACT_VERT", "refract.vert", &[]),
-    ("REFRACT_FRAG", "refract.frag", &[]),
-    ("REFRACT_CUBE_FRAG", "refract.frag", &["CUBE"]),
-    ("REFRACT_SCENE_FRAG", "refract.frag", &["SCENE"]),
-    ("REFRACT_SCENE_CUBE_FRAG", "refract.frag", &["SCENE", "CUBE"]),
-    ("REFRACT_DEBUG_FRAG", "refract.frag", &["DEBUG"]),
-    ("REFRACT_DEBUG_CUBE_FRAG", "refract.frag", &["DEBUG", "CUBE"]),
-    ("REFRACT_DEBUG_SCENE_FRAG", "refract.frag", &["DEBUG", "SCENE"]),
-    ("REFRACT_DEBUG_SCENE_CUBE_FRAG", "refract.frag", &["DEBUG", "SCENE", "CUBE"]),
-];
 
 fn main() {
     println!("cargo:rerun-if-changed=glsl");
@@ -49,19 +22,73 @@ fn main() {
     rust += &shared::to_rust(&shared).unwrap_or_else(|e| fail(&format!("glsl/include/shared.glsl:{e}")));
 
     let compiler = shaderc::Compiler::new().expect("libshaderc starts");
-    for (name, file, macros) in SHADERS {
-        let words = compile(&compiler, file, macros);
-        let bindings = reflect::bindings(&words).unwrap_or_else(|e| fail(&format!("glsl/{file}: {e}")));
-        writeln!(rust, "/// glsl/{file} {macros:?}\npub static {name}: Shader = Shader {{").unwrap();
-        writeln!(rust, "    name: \"{file}\",\n    spirv: &{words:?},\n    bindings: &[").unwrap();
-        for b in bindings {
-            writeln!(rust, "        Binding {{ index: {}, name: \"{}\", kind: Kind::{} }},", b.index, b.name, b.kind)
-                .unwrap();
-        }
-        writeln!(rust, "    ],\n}};").unwrap();
+    let mut files = Vec::new();
+    shaders(Path::new("glsl"), &mut files);
+    files.sort();
+    for file in files {
+        let source = fs::read_to_string(&file).unwrap_or_else(|e| fail(&format!("{}: {e}", file.display())));
+        let file = file.strip_prefix("glsl").expect("found below it").to_string_lossy().into_owned();
+        rust += &statics(&compiler, &file, &source);
     }
     let out = Path::new(&env::var("OUT_DIR").expect("cargo sets OUT_DIR")).join("shaders.rs");
     fs::write(out, rust).expect("OUT_DIR is writable");
+}
+
+/// Every shader below a folder.
+fn shaders(folder: &Path, found: &mut Vec<PathBuf>) {
+    let entries = fs::read_dir(folder).unwrap_or_else(|e| fail(&format!("{}: {e}", folder.display())));
+    for path in entries.map(|e| e.expect("a readable folder").path()) {
+        if path.is_dir() {
+            shaders(&path, found);
+        } else if path.extension().is_some_and(|e| e == "comp" || e == "vert" || e == "frag") {
+            found.push(path);
+        }
+    }
+}
+
+/// The Rust statics of one file: NAME_STAGE; or, of a file with a line `// Compiled with one of: A, B`, NAME_A_STAGE and
+/// NAME_B_STAGE; or, of one with `// Compiled with any of: A, B`, an array by A + 2 B.
+fn statics(compiler: &shaderc::Compiler, file: &str, source: &str) -> String {
+    let listed = |what: &str| {
+        let list = source.lines().find_map(|l| l.strip_prefix(&format!("// Compiled with {what} of: ")))?;
+        Some(list.split(',').map(|m| m.trim().to_owned()).collect::<Vec<_>>())
+    };
+    let (stem, stage) = Path::new(file).file_name().and_then(|n| n.to_str()).and_then(|n| n.split_once('.')).unwrap();
+    let (stem, stage) = (stem.to_uppercase(), stage.to_uppercase());
+    let mut rust = String::new();
+    if let Some(macros) = listed("one") {
+        for m in macros {
+            let shader = shader(compiler, file, source, &[&m]);
+            writeln!(rust, "/// glsl/{file} with {m}\npub static {stem}_{m}_{stage}: Shader = {shader};").unwrap();
+        }
+    } else if let Some(macros) = listed("any") {
+        let some = |set: usize| macros.iter().enumerate().filter(move |(i, _)| set >> i & 1 == 1).map(|(_, m)| m.as_str());
+        let all: Vec<_> =
+            (0..1 << macros.len()).map(|set| shader(compiler, file, source, &some(set).collect::<Vec<_>>())).collect();
+        writeln!(rust, "/// glsl/{file} by {}", macros.join(", ")).unwrap();
+        writeln!(rust, "pub static {stem}_{stage}: [Shader; {}] = [{}];", all.len(), all.join(", ")).unwrap();
+    } else {
+        let shader = shader(compiler, file, source, &[]);
+        writeln!(rust, "/// glsl/{file}\npub static {stem}_{stage}: Shader = {shader};").unwrap();
+    }
+    rust
+}
+
+/// One compiled shader as a Rust expression.
+fn shader(compiler: &shaderc::Compiler, file: &str, source: &str, macros: &[&str]) -> String {
+    let words = compile(compiler, file, source, macros);
+    let found = reflect::interface(&words).unwrap_or_else(|e| fail(&format!("glsl/{file}: {e}")));
+    let binding =
+        |b: &reflect::Binding| format!("Binding {{ index: {}, name: {:?}, kind: Kind::{} }}", b.index, b.name, b.kind);
+    let bindings: Vec<_> = found.bindings.iter().map(binding).collect();
+    let name = if macros.is_empty() { file.to_owned() } else { format!("{file} ({})", macros.join(", ")) };
+    format!(
+        "Shader {{ name: {name:?}, spirv: &{words:?}, bindings: &[{}], constants: &{:?}, push: &{:?}, push_bytes: {} }}",
+        bindings.join(", "),
+        found.constants,
+        found.push,
+        found.push_bytes
+    )
 }
 
 /// The commit this is built from, for figures that say what they were measured with.
@@ -76,14 +103,12 @@ fn commit() {
 }
 
 /// SPIR-V of one shader, or a failed build that names file and line.
-fn compile(compiler: &shaderc::Compiler, file: &str, macros: &[&str]) -> Vec<u32> {
+fn compile(compiler: &shaderc::Compiler, file: &str, source: &str, macros: &[&str]) -> Vec<u32> {
     let path = format!("glsl/{file}");
-    let source = fs::read_to_string(&path).unwrap_or_else(|e| fail(&format!("{path}: {e}")));
     let kind = match file.rsplit('.').next() {
         Some("comp") => shaderc::ShaderKind::Compute,
         Some("vert") => shaderc::ShaderKind::Vertex,
-        Some("frag") => shaderc::ShaderKind::Fragment,
-        other => fail(&format!("{path}: no shader stage has the extension {other:?}")),
+        _ => shaderc::ShaderKind::Fragment,
     };
     let mut options = shaderc::CompileOptions::new().expect("libshaderc starts");
     // SPIR-V 1.5: what 1.6 makes of group sizes (LocalSizeId) would need the feature maintenance4.
@@ -99,7 +124,7 @@ fn compile(compiler: &shaderc::Compiler, file: &str, macros: &[&str]) -> Vec<u32
         let content = fs::read_to_string(&path).map_err(|e| format!("{path}: {e}"))?;
         Ok(shaderc::ResolvedInclude { resolved_name: path, content })
     });
-    match compiler.compile_into_spirv(&source, kind, &path, "main", Some(&options)) {
+    match compiler.compile_into_spirv(source, kind, &path, "main", Some(&options)) {
         Ok(artifact) => artifact.as_binary().to_vec(),
         Err(e) => fail(&e.to_string()),
     }

@@ -1,76 +1,172 @@
-//! The bindings of set 0 in a SPIR-V module: just enough reflection to lay out descriptor sets from the shader itself.
+//! What a SPIR-V module asks of its pipeline: bindings of set 0, specialisation constants and push constants, all by name.
 
 use std::collections::HashMap;
 
 pub struct Binding {
     pub index: u32,
     pub name: String,
-    /// Variant of the library's `Kind`.
-    pub kind: &'static str,
+    /// Variant of the library's `Kind`, with what it holds.
+    pub kind: String,
+}
+
+#[derive(Default)]
+pub struct Interface {
+    pub bindings: Vec<Binding>,
+    /// Constant id and name.
+    pub constants: Vec<(u32, String)>,
+    /// Name and byte offset of each member of the push-constant block.
+    pub push: Vec<(String, u32)>,
+    /// Size of that block in bytes.
+    pub push_bytes: u32,
 }
 
 // SPIR-V 1.6, section 3: the instructions, decorations and storage classes that matter here.
 const OP_NAME: u32 = 5;
+const OP_MEMBER_NAME: u32 = 6;
+const OP_TYPE_INT: u32 = 21;
+const OP_TYPE_FLOAT: u32 = 22;
+const OP_TYPE_VECTOR: u32 = 23;
+const OP_TYPE_MATRIX: u32 = 24;
 const OP_TYPE_IMAGE: u32 = 25;
 const OP_TYPE_SAMPLER: u32 = 26;
+const OP_TYPE_STRUCT: u32 = 30;
 const OP_TYPE_POINTER: u32 = 32;
+const OP_SPEC_CONSTANT_COMPOSITE: u32 = 51;
 const OP_VARIABLE: u32 = 59;
 const OP_DECORATE: u32 = 71;
+const OP_MEMBER_DECORATE: u32 = 72;
+const DECORATION_SPEC_ID: u32 = 1;
+const DECORATION_BUILT_IN: u32 = 11;
 const DECORATION_BINDING: u32 = 33;
 const DECORATION_SET: u32 = 34;
+const DECORATION_OFFSET: u32 = 35;
+const BUILT_IN_WORKGROUP_SIZE: u32 = 25;
 const UNIFORM_CONSTANT: u32 = 0;
 const UNIFORM: u32 = 2;
+const PUSH_CONSTANT: u32 = 9;
 const STORAGE_BUFFER: u32 = 12;
+const DIM_CUBE: u32 = 3;
 
-pub fn bindings(words: &[u32]) -> Result<Vec<Binding>, String> {
-    let mut names = HashMap::new();
-    let mut binding_of = HashMap::new();
-    let mut kind_of = HashMap::new();
-    let mut pointee = HashMap::new();
-    let mut variables = Vec::new();
+enum Type {
+    /// Bytes.
+    Scalar(u32),
+    Uint,
+    /// Component type or column type, and how many.
+    Vector(u32, u32),
+    Image(String),
+    Sampler,
+    Struct(Vec<u32>),
+    Pointer(u32),
+}
+
+#[derive(Default)]
+struct Module {
+    names: HashMap<u32, String>,
+    member_names: HashMap<(u32, u32), String>,
+    member_offsets: HashMap<(u32, u32), u32>,
+    types: HashMap<u32, Type>,
+}
+
+pub fn interface(words: &[u32]) -> Result<Interface, String> {
+    let mut m = Module::default();
+    let (mut binding_of, mut spec_of) = (HashMap::new(), HashMap::new());
+    let (mut variables, mut group_size, mut composites) = (Vec::new(), None, HashMap::new());
     let mut at = 5; // past the header
     while at < words.len() {
         let (count, op) = ((words[at] >> 16) as usize, words[at] & 0xffff);
         let args = words.get(at + 1..at + count).ok_or("SPIR-V ends inside an instruction")?;
         match op {
-            OP_NAME => {
-                let bytes: Vec<u8> = args[1..].iter().flat_map(|w| w.to_le_bytes()).take_while(|b| *b != 0).collect();
-                names.insert(args[0], String::from_utf8_lossy(&bytes).into_owned());
-            }
-            OP_DECORATE if args[1] == DECORATION_BINDING => {
-                binding_of.insert(args[0], args[2]);
+            OP_NAME => drop(m.names.insert(args[0], text(&args[1..]))),
+            OP_MEMBER_NAME => drop(m.member_names.insert((args[0], args[1]), text(&args[2..]))),
+            OP_DECORATE if args[1] == DECORATION_BINDING => drop(binding_of.insert(args[0], args[2])),
+            OP_DECORATE if args[1] == DECORATION_SPEC_ID => drop(spec_of.insert(args[0], args[2])),
+            OP_DECORATE if args[1] == DECORATION_BUILT_IN && args[2] == BUILT_IN_WORKGROUP_SIZE => {
+                group_size = Some(args[0]);
             }
             OP_DECORATE if args[1] == DECORATION_SET && args[2] != 0 => {
                 return Err(format!("descriptor set {}; passes use set 0 only", args[2]));
             }
+            OP_MEMBER_DECORATE if args[2] == DECORATION_OFFSET => {
+                m.member_offsets.insert((args[0], args[1]), args[3]);
+            }
+            OP_TYPE_INT => drop(m.types.insert(args[0], if args[2] == 0 { Type::Uint } else { Type::Scalar(4) })),
+            OP_TYPE_FLOAT => drop(m.types.insert(args[0], Type::Scalar(args[1] / 8))),
+            OP_TYPE_VECTOR | OP_TYPE_MATRIX => drop(m.types.insert(args[0], Type::Vector(args[1], args[2]))),
             OP_TYPE_IMAGE => {
-                kind_of.insert(args[0], if args[6] == 2 { "StorageImage" } else { "SampledImage" });
+                let uint = matches!(m.types.get(&args[1]), Some(Type::Uint));
+                let (kind, cube) = (if args[6] == 2 { "StorageImage" } else { "SampledImage" }, args[2] == DIM_CUBE);
+                let texels = format!("Texels {{ uint: {uint}, array: {}, cube: {cube} }}", args[4] == 1);
+                m.types.insert(args[0], Type::Image(format!("{kind}({texels})")));
             }
-            OP_TYPE_SAMPLER => {
-                kind_of.insert(args[0], "Sampler");
-            }
-            OP_TYPE_POINTER => {
-                pointee.insert(args[0], args[2]);
-            }
+            OP_TYPE_SAMPLER => drop(m.types.insert(args[0], Type::Sampler)),
+            OP_TYPE_STRUCT => drop(m.types.insert(args[0], Type::Struct(args[1..].to_vec()))),
+            OP_TYPE_POINTER => drop(m.types.insert(args[0], Type::Pointer(args[2]))),
+            OP_SPEC_CONSTANT_COMPOSITE => drop(composites.insert(args[1], args[2..].to_vec())),
             OP_VARIABLE => variables.push((args[0], args[1], args[2])),
             _ => {}
         }
         at += count.max(1);
     }
-    let mut found = Vec::new();
-    for (pointer, variable, storage) in variables {
-        let Some(&index) = binding_of.get(&variable) else { continue };
-        let kind = match storage {
-            UNIFORM => "UniformBuffer",
-            STORAGE_BUFFER => "StorageBuffer",
-            UNIFORM_CONSTANT => {
-                *kind_of.get(&pointee[&pointer]).ok_or(format!("binding {index} has a type no pass uses"))?
-            }
-            other => return Err(format!("binding {index} has storage class {other} no pass uses")),
-        };
-        let name = names.get(&variable).cloned().unwrap_or_default();
-        found.push(Binding { index, name, kind });
+    // Edges of work groups are constants without a name.
+    let edges = group_size.and_then(|id| composites.get(&id)).into_iter().flatten();
+    for (id, axis) in edges.zip(["x", "y", "z"]) {
+        let unnamed = m.names.get(id).is_none_or(String::is_empty);
+        if unnamed && spec_of.contains_key(id) {
+            m.names.insert(*id, format!("local_size_{axis}"));
+        }
     }
-    found.sort_by_key(|b| b.index);
+    let mut found = Interface::default();
+    for (id, spec) in spec_of {
+        found.constants.push((spec, m.names.get(&id).cloned().unwrap_or_default()));
+    }
+    for (pointer, variable, storage) in variables {
+        let Some(Type::Pointer(pointee)) = m.types.get(&pointer) else { continue };
+        if storage == PUSH_CONSTANT {
+            found.push_bytes = m.bytes(*pointee);
+            found.push = m.members(*pointee);
+        }
+        let Some(&index) = binding_of.get(&variable) else { continue };
+        let kind = match (storage, m.types.get(pointee)) {
+            (UNIFORM, _) => format!("UniformBuffer({})", m.bytes(*pointee)),
+            (STORAGE_BUFFER, _) => "StorageBuffer".into(),
+            (UNIFORM_CONSTANT, Some(Type::Image(kind))) => kind.clone(),
+            (UNIFORM_CONSTANT, Some(Type::Sampler)) => "Sampler".into(),
+            _ => return Err(format!("binding {index} has a type or a storage class that no pass uses")),
+        };
+        // A block without a name of its own goes by its only member's.
+        let name = m.names.get(&variable).filter(|n| !n.is_empty()).cloned();
+        let name = name.or_else(|| m.member_names.get(&(*pointee, 0)).cloned()).unwrap_or_default();
+        found.bindings.push(Binding { index, name, kind });
+    }
+    found.bindings.sort_by_key(|b| b.index);
+    found.constants.sort();
     Ok(found)
+}
+
+fn text(words: &[u32]) -> String {
+    let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).take_while(|b| *b != 0).collect();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+impl Module {
+    /// Size of a type as far as it is fixed, std140 and std430 alike.
+    fn bytes(&self, id: u32) -> u32 {
+        match self.types.get(&id) {
+            Some(Type::Scalar(bytes)) => *bytes,
+            Some(Type::Uint) => 4,
+            // Columns of a matrix are four floats here.
+            Some(Type::Vector(of, count)) => count * self.bytes(*of),
+            Some(Type::Struct(members)) => {
+                let ends = (0u32..).zip(members);
+                ends.map(|(i, of)| self.member_offsets.get(&(id, i)).unwrap_or(&0) + self.bytes(*of)).max().unwrap_or(0)
+            }
+            _ => 0,
+        }
+    }
+
+    fn members(&self, id: u32) -> Vec<(String, u32)> {
+        let Some(Type::Struct(members)) = self.types.get(&id) else { return Vec::new() };
+        let name = |i| self.member_names.get(&(id, i)).cloned().unwrap_or_default();
+        (0..members.len() as u32).map(|i| (name(i), self.member_offsets.get(&(id, i)).copied().unwrap_or(0))).collect()
+    }
 }

@@ -3,6 +3,7 @@
 // body from its end. Three dispatches: COUNT (each block's particles of each list), SCAN (where each block's begin),
 // SCATTER (the lists, and the indirect draws of them).
 #version 460
+// Compiled with one of: COUNT, SCAN, SCATTER
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "frame.glsl"

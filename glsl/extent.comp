@@ -1,6 +1,7 @@
 // The box of all positions, and what follows from it: the frame's bounds and search limits, the cells it occupies, how many
 // bits of them the sort has to look at, and so how many of its passes run. REDUCE runs over the particles, PLAN once.
 #version 460
+// Compiled with one of: REDUCE, PLAN
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"

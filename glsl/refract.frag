@@ -7,6 +7,7 @@
 // Mesa 22.3 compiles the shader anew in every frame and keeps it (9 MB and 200 ms each). Mixed with something fetched, or
 // as a specialisation constant, the same condition costs nothing (tests/endurance.rs).
 #version 460
+// Compiled with any of: DEBUG, SCENE, CUBE
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"

@@ -6,6 +6,7 @@
 // Sorted cells: cells as wide as the support, so 5 x 5 runs of 5 cells. RELATION: one run of the relation table, whose
 // cells are as wide as the reach.
 #version 460
+// Compiled with any of: NEIGHBOURS
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"

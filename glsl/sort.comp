@@ -4,6 +4,7 @@
 // that only indices move; entries of the same cell stay in the order of the input. GATHER then copies the positions into
 // that order.
 #version 460
+// Compiled with one of: COUNT, SCAN, SCATTER, GATHER
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"

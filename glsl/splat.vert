@@ -1,6 +1,7 @@
 // Particles as point sprites, or as quads where points are too small (QUADS). Both hand the same numbers to
 // splat.frag, which ray-casts the quadric; the primitive only has to cover it.
 #version 460
+// Compiled with any of: QUADS
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "frame.glsl"

@@ -61,6 +61,34 @@ impl Access {
         }
     }
 
+    /// What an image has to be made for to be used so; `None` if no image is.
+    pub(crate) fn image_usage(self) -> Option<vk::ImageUsageFlags> {
+        use vk::ImageUsageFlags as U;
+        match self {
+            Access::ComputeRead | Access::FragmentRead => Some(U::SAMPLED),
+            Access::ComputeWrite => Some(U::STORAGE),
+            Access::ColorAttachment => Some(U::COLOR_ATTACHMENT),
+            Access::DepthAttachment => Some(U::DEPTH_STENCIL_ATTACHMENT),
+            Access::TransferRead => Some(U::TRANSFER_SRC),
+            Access::TransferWrite => Some(U::TRANSFER_DST),
+            Access::ComputeReadWrite | Access::VertexRead | Access::UniformRead | Access::IndirectRead => None,
+        }
+    }
+
+    /// The same of buffers.
+    pub(crate) fn buffer_usage(self) -> Option<vk::BufferUsageFlags> {
+        use vk::BufferUsageFlags as U;
+        match self {
+            Access::ComputeRead | Access::ComputeWrite | Access::ComputeReadWrite => Some(U::STORAGE_BUFFER),
+            Access::VertexRead | Access::FragmentRead => Some(U::STORAGE_BUFFER),
+            Access::UniformRead => Some(U::UNIFORM_BUFFER),
+            Access::IndirectRead => Some(U::INDIRECT_BUFFER),
+            Access::TransferRead => Some(U::TRANSFER_SRC),
+            Access::TransferWrite => Some(U::TRANSFER_DST),
+            Access::ColorAttachment | Access::DepthAttachment => None,
+        }
+    }
+
     /// Whether this changes the resource.
     pub fn writes(self) -> bool {
         use Access::*;

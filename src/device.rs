@@ -24,6 +24,9 @@ pub struct Host {
     pub frames_in_flight: u32,
     /// Whether the device was created with the `largePoints` feature. Without it everything is drawn as quads.
     pub large_points: bool,
+    /// A cache for the renderer's pipelines; null for none. It is the host's to load, to save and to destroy, and has to
+    /// outlive the renderer.
+    pub pipeline_cache: vk::PipelineCache,
     /// `VK_EXT_debug_utils`, if the instance has it: names resources and labels passes.
     pub debug_utils: Option<ash::ext::debug_utils::Device>,
 }

@@ -56,6 +56,14 @@ pub enum Error {
         /// Allowed range, or what to do.
         remedy: String,
     },
+    /// A pass declares what cannot be: a mistake in this library, and none in the call.
+    #[error("pass {pass}: {problem}. This is a mistake in meniscus: please report it")]
+    Pass {
+        /// Name of the pass.
+        pass: &'static str,
+        /// What does not fit.
+        problem: String,
+    },
     /// The caller broke the order of calls.
     #[error("{0}")]
     Order(&'static str),

@@ -1,53 +1,127 @@
-//! THE FRAME, from top to bottom. Everything a frame does is a line here; each pass lives in `src/passes/` with its
-//! shader in `glsl/`, its CPU twin in `src/twin/` and its test in `tests/gpu/`, all under the same name.
+//! THE FRAME, from top to bottom. Everything a frame does is a line here. A pass has one stem: its shader is in `glsl/`,
+//! its CPU twin and its test go by the same name.
 
 use crate::{
-    Error, input::Background, passes::Passes, recorder::Recorder, settings::Settings, shader::Prepare, targets::Needs,
+    Error, Settings,
+    device::Limits,
+    input::{Background, EnvironmentShape},
+    layers::Surfaces,
+    passes::{Arrays, compact, counters, cull, extent, occlude, shape, sort},
+    plan::{Home, Plan},
+    shader, smooth,
 };
+use ash::vk;
 
-/// Records the passes of one frame. What a scene does not need is not there: no splash particles, no splash maps; one
-/// refraction, no back maps; no particles at all, only the background.
-pub(crate) fn record(
-    r: &mut Recorder,
-    passes: &mut Passes,
-    needs: &Needs,
-    settings: &Settings,
-    prepare: Option<&Prepare>,
-) -> Result<(), Error> {
-    if needs.count > 0 {
-        // Counters to zero, bounds to "nothing is certain".
-        passes.reset.record(r, needs)?;
-        if let Some(prepare) = prepare {
+/// The passes of one frame. What a scene does not need is not there: no splash particles, no splash maps; one refraction,
+/// no back maps; no particles at all, only the background.
+pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
+    let mut plan = Plan::new(scene.size);
+    let method = &scene.settings.method;
+    let mut surfaces = Surfaces::default();
+    if scene.count > 0 {
+        plan.work_for(Home::View);
+        let counters = counters(&mut plan);
+        plan.fill("reset", counters, 0, vk::WHOLE_SIZE, 0);
+
+        plan.work_for(Home::Particles);
+        let particles = match &scene.prepare {
             // From positions on the device: their box, their neighbours (Im16 §III), classes and ellipsoids (YuTurk13).
-            passes.extent.record(r, needs, prepare)?;
-            passes.sort.record(r, needs, prepare)?;
-            passes.shape.record(r, needs, prepare)?;
-        }
+            Some(p) => {
+                let extent = extent::record(&mut plan, scene, &p.constants);
+                let sorted = sort::record(&mut plan, scene, p, extent);
+                shape::record(&mut plan, scene, p, extent, &sorted)
+            }
+            None => Arrays::given(&mut plan),
+        };
+
+        plan.work_for(Home::View);
         // Which particles can show at all.
-        if needs.body && needs.occlusion {
-            passes.occlude.record(r, needs)?;
+        let bounds = scene.occlusion().then(|| occlude::record(&mut plan, scene, &particles));
+        let visible = cull::record(&mut plan, scene, &particles, bounds);
+        let drawn = compact::record(&mut plan, scene, &particles, visible);
+        // The liquid's surfaces (Imai16 §4.2), the body's smoothed (Imai16 §4.3).
+        surfaces = method.layers.member().record(&mut plan, scene, &drawn);
+        surfaces.body = surfaces.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
+    }
+    plan.work_for(Home::View);
+    // Light through them (Imai16 §4.4, §4.5). Without liquid the host's picture stays.
+    if scene.count > 0 || scene.walks || scene.background == Background::Environment {
+        method.optics.member().record(&mut plan, scene, &surfaces);
+    }
+    plan.finish()
+}
+
+/// What a frame draws: all that decides which passes it has.
+pub(crate) struct Scene<'a> {
+    pub settings: &'a Settings,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Particles.
+    pub count: u32,
+    /// Whether any of them may be splash.
+    pub splash: bool,
+    /// Whether any of them may belong to the body.
+    pub body: bool,
+    /// Preparation on the device, if the frame starts from positions there.
+    pub prepare: Option<Preparation>,
+    pub has_scene: bool,
+    pub environment: EnvironmentShape,
+    pub background: Background,
+    pub output: vk::Format,
+    /// Whether what each walk met is written too.
+    pub walks: bool,
+    /// Whether the device has points larger than a pixel.
+    pub points: bool,
+    /// Largest storage buffer in bytes.
+    pub storage_size: u64,
+}
+
+/// What the preparation on the device is told.
+#[derive(Clone, Copy)]
+pub(crate) struct Preparation {
+    pub constants: shader::Prepare,
+    /// Entries of the sort: one a particle, or 27.
+    pub entries: u64,
+    /// Whether classes are kept from frame to frame.
+    pub keep_classes: bool,
+    /// Neighbours of each particle that are listed.
+    pub neighbours: u32,
+}
+
+impl<'a> Scene<'a> {
+    /// A frame of so many particles, before the environment alone.
+    pub fn new(settings: &'a Settings, size: [u32; 2], [splash, body]: [usize; 2], limits: &Limits) -> Scene<'a> {
+        Scene {
+            settings,
+            size,
+            count: (splash + body) as u32,
+            splash: splash > 0,
+            body: body > 0,
+            prepare: None,
+            has_scene: false,
+            environment: EnvironmentShape::Equirect,
+            background: Background::Environment,
+            output: vk::Format::R32G32B32A32_SFLOAT,
+            walks: false,
+            points: limits.point_size > 1.0,
+            storage_size: limits.storage_size,
         }
-        passes.cull.record(r, needs)?;
-        passes.compact.record(r, needs)?;
-        // Nearest fronts and farthest backs of both classes, ray-cast (Imai16 §4.2).
-        passes.splat.record(r, needs)?;
     }
-    if needs.body {
-        // The body's surfaces, smoothed (Imai16 §4.3). A smoothing filter goes here.
-        for iteration in 0..needs.iterations {
-            passes.plane_fit.record(r, needs, settings, iteration)?;
-        }
-        if needs.iterations > 0 {
-            passes.normals.record(r, needs)?;
-        }
+
+    /// Sides of each class that are drawn: front only, or front and back.
+    pub fn sides(&self) -> u32 {
+        if self.settings.method.optics.member().asks().backs { 2 } else { 1 }
     }
-    if needs.tiles() {
-        // Where rays outside the liquid need not look for a second volume.
-        passes.tiles.record(r, needs)?;
+
+    /// Whether hidden particles are dropped before drawing. That only saves time: where its bounds do not fit a storage
+    /// buffer, everything is drawn.
+    pub fn occlusion(&self) -> bool {
+        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        self.body && self.settings.drawing.occlusion_culling && 8 * pixels <= self.storage_size
     }
-    // Up to four refractions, and the light they bring back (Imai16 §4.4, §4.5). Without liquid the host's picture stays.
-    if needs.count > 0 || needs.debug || r.externals.background == Background::Environment {
-        passes.refract.record(r, needs, settings)?;
+
+    /// Whether the last shader encodes sRGB.
+    pub fn encode_srgb(&self) -> bool {
+        crate::optics::walk::takes_linear(self.output) == Some(false)
     }
-    Ok(())
 }

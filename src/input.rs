@@ -62,6 +62,7 @@ pub struct SceneInput {
 
 /// One frame.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct FrameInput<'a> {
     /// Which of the frames in flight this is.
     pub slot: usize,
@@ -83,12 +84,6 @@ pub struct FrameInput<'a> {
     /// Output, of the format given to [`crate::Renderer::new`] and the size given to [`crate::Renderer::resize`], in
     /// `COLOR_ATTACHMENT_OPTIMAL` before and after.
     pub output: vk::ImageView,
-    /// Also write what each walk met into [`crate::targets::Id::Walk`] and [`crate::targets::Id::Direction`], for dumps and
-    /// statistics.
-    pub debug: bool,
-    /// Where positions are prepared on the device, also list so many neighbours of every particle in
-    /// [`crate::targets::Id::Neighbours`]: for each its index, how many there are, and the indices of the first of them; 0 lists none. For tests and dumps.
-    pub neighbours: u32,
 }
 
 /// Layouts in which a shader may sample an image.
@@ -157,8 +152,6 @@ impl<'a> FrameInput<'a> {
             environment: None,
             eye_inside: false,
             output,
-            debug: false,
-            neighbours: 0,
         }
     }
 }

@@ -43,29 +43,41 @@
 #![deny(unsafe_op_in_unsafe_fn)]
 #![warn(clippy::undocumented_unsafe_blocks)]
 
-pub mod access;
+mod access;
 pub mod device;
 pub mod environment;
 pub mod error;
-pub mod frame;
+mod frame;
 #[cfg(feature = "host")]
 pub mod host;
 pub mod input;
+#[cfg(feature = "inspect")]
+pub mod inspect;
 #[cfg(feature = "io")]
 pub mod io;
+pub mod layers;
+pub mod method;
+pub mod optics;
+pub mod parameters;
 pub mod particles;
 mod passes;
 mod pipeline;
+mod plan;
 pub mod prepare;
 pub mod profile;
 mod recorder;
 pub mod renderer;
 mod resources;
 pub mod settings;
+#[cfg(not(feature = "inspect"))]
+mod shader;
+#[cfg(feature = "inspect")]
 pub mod shader;
 mod slot;
+pub mod smooth;
 pub mod space;
-pub mod targets;
+mod table;
+#[cfg(feature = "inspect")]
 pub mod twin;
 
 // Of the versions whose types stand in the public interface.
@@ -75,6 +87,11 @@ pub use device::Host;
 pub use environment::{Equirect, EquirectBuilder};
 pub use error::Error;
 pub use input::{Background, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput};
+pub use method::{Method, PRESETS, Preset};
+pub use optics::Fresnel;
+pub use parameters::{Parameter, Parameters};
 pub use particles::{Class, Ellipsoid, Particles};
+pub use recorder::PlanEntry;
 pub use renderer::Renderer;
-pub use settings::{Camera, Fresnel, Settings, Weighting};
+pub use settings::{Camera, Drawing, Liquid, Settings};
+pub use table::LedgerEntry;

@@ -3,37 +3,77 @@
 use crate::{
     Error,
     device::Host,
+    plan::{Blend, Recipe},
     shader::{Kind, Shader},
 };
 use ash::vk;
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// What making one pipeline gives.
+type Made = Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>;
+
+impl Blend {
+    fn state(self) -> vk::PipelineColorBlendAttachmentState {
+        let state =
+            vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
+        match self {
+            Blend::Replace => state,
+        }
+    }
+}
 
 /// A pipeline, its layouts, and the bindings its descriptor set has.
 pub(crate) struct Pipeline {
     pub handle: vk::Pipeline,
     pub layout: vk::PipelineLayout,
     pub set_layout: vk::DescriptorSetLayout,
-    pub bindings: Vec<crate::shader::Binding>,
     pub bind_point: vk::PipelineBindPoint,
     pub stages: vk::ShaderStageFlags,
     /// Part of the set layout; null where the shader has none.
     sampler: vk::Sampler,
 }
 
-/// What a graphics pipeline of this library differs in.
-pub(crate) struct Graphics<'a> {
-    pub vertex: &'a Shader,
-    pub fragment: &'a Shader,
-    pub constants: &'a [u32],
-    pub topology: vk::PrimitiveTopology,
-    pub colors: &'a [vk::Format],
-    /// Depth test and write against D32_SFLOAT; the comparison is dynamic.
-    pub depth: bool,
-    pub push_bytes: u32,
+/// Every pipeline that was ever asked for.
+#[derive(Default)]
+pub(crate) struct Pipelines(HashMap<Recipe, Pipeline>);
+
+impl Pipelines {
+    /// Makes those that are not there yet, on all cores; says how many.
+    pub fn make<'a>(&mut self, host: &Host, recipes: impl IntoIterator<Item = &'a Recipe>) -> Result<usize, Error> {
+        let missing: Vec<_> = recipes.into_iter().filter(|r| !self.0.contains_key(*r)).collect();
+        // One after the other where there is one: a frame on the host's thread wakes no others.
+        let made: Vec<_> = match missing.as_slice() {
+            [one] => vec![Pipeline::new(host, one)],
+            many => many.par_iter().map(|r| Pipeline::new(host, r)).collect(),
+        };
+        let mut first_error = Ok(missing.len());
+        for (recipe, pipeline) in missing.into_iter().zip(made) {
+            match pipeline {
+                Ok(pipeline) => drop(self.0.insert(recipe.clone(), pipeline)),
+                Err(e) => first_error = first_error.and(Err(e)),
+            }
+        }
+        first_error
+    }
+
+    pub fn get(&self, recipe: &Recipe) -> Option<&Pipeline> {
+        self.0.get(recipe)
+    }
+
+    pub fn destroy(&mut self, host: &Host) {
+        self.0.drain().for_each(|(_, mut p)| p.destroy(host));
+    }
 }
 
-/// Specialisation: constant ids 0, 1, 2 … of four bytes each.
-fn map_entries(constants: &[u32]) -> Vec<vk::SpecializationMapEntry> {
-    (0..constants.len() as u32).map(|i| vk::SpecializationMapEntry { constant_id: i, offset: 4 * i, size: 4 }).collect()
+/// Specialisation: four bytes a constant.
+fn map_entries(constants: &[(u32, u32)]) -> (Vec<vk::SpecializationMapEntry>, Vec<u32>) {
+    let entry = |(i, (id, _)): (usize, &(u32, u32))| vk::SpecializationMapEntry {
+        constant_id: *id,
+        offset: 4 * i as u32,
+        size: 4,
+    };
+    (constants.iter().enumerate().map(entry).collect(), constants.iter().map(|c| c.1).collect())
 }
 
 struct Module<'a>(vk::ShaderModule, &'a Host);
@@ -55,48 +95,47 @@ impl Drop for Module<'_> {
 }
 
 impl Pipeline {
-    fn layouts(
-        host: &Host,
-        shaders: &[&Shader],
-        stages: vk::ShaderStageFlags,
-        push_bytes: u32,
-        bind_point: vk::PipelineBindPoint,
-    ) -> Result<Pipeline, Error> {
-        let mut bindings: Vec<crate::shader::Binding> = Vec::new();
-        for b in shaders.iter().flat_map(|s| s.bindings) {
-            if !bindings.iter().any(|other| other.index == b.index) {
-                bindings.push(*b);
-            }
-        }
-        let name = shaders[0].name;
+    fn new(host: &Host, recipe: &Recipe) -> Result<Pipeline, Error> {
+        let modules: Result<Vec<_>, _> = recipe.shaders.iter().map(|s| Module::new(host, s)).collect();
+        let modules = modules?;
+        let mut pipeline = Self::layouts(host, recipe)?;
+        let made = match modules.as_slice() {
+            [one] => pipeline.compute(host, recipe, one),
+            _ => pipeline.graphics(host, recipe, &modules),
+        };
+        pipeline.finish(host, recipe.name(), made)?;
+        Ok(pipeline)
+    }
+
+    fn layouts(host: &Host, recipe: &Recipe) -> Result<Pipeline, Error> {
+        let compute = recipe.shaders.len() == 1;
         let mut pipeline = Pipeline {
             handle: vk::Pipeline::null(),
             layout: vk::PipelineLayout::null(),
             set_layout: vk::DescriptorSetLayout::null(),
-            bindings,
-            bind_point,
-            stages,
+            bind_point: if compute { vk::PipelineBindPoint::COMPUTE } else { vk::PipelineBindPoint::GRAPHICS },
+            stages: recipe.stages(),
             sampler: vk::Sampler::null(),
         };
-        match pipeline.make_layouts(host, push_bytes) {
+        match pipeline.fill_layouts(host, recipe) {
             Ok(()) => Ok(pipeline),
-            Err(e) => {
+            Err(result) => {
                 pipeline.destroy(host);
-                Err(Error::vulkan(name)(e))
+                Err(Error::vulkan(recipe.name())(result))
             }
         }
     }
 
-    fn make_layouts(&mut self, host: &Host, push_bytes: u32) -> Result<(), vk::Result> {
-        if self.bindings.iter().any(|b| b.kind == Kind::Sampler) {
+    fn fill_layouts(&mut self, host: &Host, recipe: &Recipe) -> Result<(), vk::Result> {
+        let bindings = recipe.bindings();
+        if bindings.iter().any(|b| b.kind == Kind::Sampler) {
             let edge = vk::SamplerAddressMode::CLAMP_TO_EDGE;
             let info = vk::SamplerCreateInfo::default().address_mode_u(edge).address_mode_v(edge).address_mode_w(edge);
-            // SAFETY: a complete info on a live device; what is made here is destroyed with the struct.
+            // SAFETY: the device is alive, the infos are complete; also for the calls below.
             self.sampler = unsafe { host.device.create_sampler(&info, None) }?;
         }
         let samplers = [self.sampler];
-        let infos: Vec<_> = self
-            .bindings
+        let infos: Vec<_> = bindings
             .iter()
             .map(|b| {
                 let info = vk::DescriptorSetLayoutBinding::default()
@@ -110,68 +149,61 @@ impl Pipeline {
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&infos);
         // SAFETY: as above.
         self.set_layout = unsafe { host.device.create_descriptor_set_layout(&info, None) }?;
-        let range = [vk::PushConstantRange { stage_flags: self.stages, offset: 0, size: push_bytes }];
+        let size = recipe.push_bytes();
+        let range = [vk::PushConstantRange { stage_flags: self.stages, offset: 0, size }];
         let info = vk::PipelineLayoutCreateInfo::default()
             .set_layouts(std::slice::from_ref(&self.set_layout))
-            .push_constant_ranges(if push_bytes > 0 { &range } else { &[] });
+            .push_constant_ranges(if size > 0 { &range } else { &[] });
         // SAFETY: as above.
         self.layout = unsafe { host.device.create_pipeline_layout(&info, None) }?;
         Ok(())
     }
 
-    pub fn compute(host: &Host, shader: &Shader, constants: &[u32], push_bytes: u32) -> Result<Pipeline, Error> {
-        let stages = vk::ShaderStageFlags::COMPUTE;
-        let module = Module::new(host, shader)?;
-        let mut pipeline = Self::layouts(host, &[shader], stages, push_bytes, vk::PipelineBindPoint::COMPUTE)?;
-        let entries = map_entries(constants);
-        let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(constants));
+    fn compute(&self, host: &Host, recipe: &Recipe, module: &Module) -> Made {
+        let (entries, data) = map_entries(&recipe.constants);
+        let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&data));
         let stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(stages)
+            .stage(self.stages)
             .module(module.0)
             .name(c"main")
             .specialization_info(&special);
-        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout);
-        // SAFETY: module, layout and specialisation outlive the call.
-        let made = unsafe { host.device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
-        pipeline.finish(host, shader.name, made)?;
-        Ok(pipeline)
+        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
+        // SAFETY: module, layout and specialisation outlive the call; the cache is alive or null (contract of `Host`).
+        unsafe { host.device.create_compute_pipelines(host.pipeline_cache, &[info], None) }
     }
 
-    pub fn graphics(host: &Host, g: &Graphics) -> Result<Pipeline, Error> {
-        let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
-        let (vertex, fragment) = (Module::new(host, g.vertex)?, Module::new(host, g.fragment)?);
-        let mut pipeline =
-            Self::layouts(host, &[g.vertex, g.fragment], stages, g.push_bytes, vk::PipelineBindPoint::GRAPHICS)?;
-        let entries = map_entries(g.constants);
-        let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(g.constants));
-        let stage =
-            |flag, module| vk::PipelineShaderStageCreateInfo::default().stage(flag).module(module).name(c"main");
-        let stage_infos = [
-            stage(vk::ShaderStageFlags::VERTEX, vertex.0),
-            stage(vk::ShaderStageFlags::FRAGMENT, fragment.0).specialization_info(&special),
-        ];
+    fn graphics(&self, host: &Host, recipe: &Recipe, modules: &[Module]) -> Made {
+        let (entries, data) = map_entries(&recipe.constants);
+        let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&data));
+        let stages = [vk::ShaderStageFlags::VERTEX, vk::ShaderStageFlags::FRAGMENT];
+        let stage_infos: Vec<_> = stages
+            .into_iter()
+            .zip(modules)
+            .map(|(flag, module)| {
+                let info = vk::PipelineShaderStageCreateInfo::default().stage(flag).module(module.0).name(c"main");
+                info.specialization_info(&special)
+            })
+            .collect();
         let input = vk::PipelineVertexInputStateCreateInfo::default();
-        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(g.topology);
+        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(recipe.topology);
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
         let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
         let samples =
             vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let depth =
-            vk::PipelineDepthStencilStateCreateInfo::default().depth_test_enable(g.depth).depth_write_enable(g.depth);
-        let blends = vec![
-            vk::PipelineColorBlendAttachmentState::default()
-                .color_write_mask(vk::ColorComponentFlags::RGBA);
-            g.colors.len()
-        ];
+        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(recipe.depth)
+            .depth_write_enable(recipe.depth);
+        let blends: Vec<_> = recipe.colors.iter().map(|(_, blend)| blend.state()).collect();
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
         let mut dynamic_states = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
-        if g.depth {
+        if recipe.depth {
             dynamic_states.push(vk::DynamicState::DEPTH_COMPARE_OP);
         }
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
-        let depth_format = if g.depth { vk::Format::D32_SFLOAT } else { vk::Format::UNDEFINED };
+        let formats: Vec<_> = recipe.colors.iter().map(|(format, _)| *format).collect();
+        let depth_format = if recipe.depth { vk::Format::D32_SFLOAT } else { vk::Format::UNDEFINED };
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
-            .color_attachment_formats(g.colors)
+            .color_attachment_formats(&formats)
             .depth_attachment_format(depth_format);
         let info = vk::GraphicsPipelineCreateInfo::default()
             .stages(&stage_infos)
@@ -183,19 +215,17 @@ impl Pipeline {
             .depth_stencil_state(&depth)
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
-            .layout(pipeline.layout)
+            .layout(self.layout)
             .push_next(&mut rendering);
-        // SAFETY: everything the info points to outlives the call.
-        let made = unsafe { host.device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
-        pipeline.finish(host, g.fragment.name, made)?;
-        Ok(pipeline)
+        // SAFETY: everything the info points to outlives the call; the cache is alive or null (contract of `Host`).
+        unsafe { host.device.create_graphics_pipelines(host.pipeline_cache, &[info], None) }
     }
 
     fn finish(
         &mut self,
         host: &Host,
         name: &str,
-        made: Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>,
+        made: Made,
     ) -> Result<(), Error> {
         match made {
             Ok(pipelines) => {

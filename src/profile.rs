@@ -1,6 +1,6 @@
 //! GPU time of each pass: one scope a pass, a pair of timestamps each, read without waiting.
 
-use crate::{Error, device::Host};
+use crate::{Error, device::Host, plan::Home};
 use ash::vk;
 
 /// GPU time of one pass in milliseconds.
@@ -10,6 +10,8 @@ pub struct PassTime {
     pub name: String,
     /// Milliseconds from the pass's first to its last command.
     pub ms: f64,
+    /// Whether it works for the particles, whatever the view: prepares them.
+    pub prepares: bool,
 }
 
 /// GPU times of one frame.
@@ -21,30 +23,43 @@ pub struct FrameTimes {
     pub span_ms: f64,
 }
 
-/// Most passes a frame has: 20 iterations of smoothing and a dozen others.
-const SCOPES: u32 = 64;
-
 pub(crate) struct Profiler {
     pool: vk::QueryPool,
-    names: Vec<String>,
+    /// Scopes that there is room for.
+    room: u32,
+    names: Vec<(&'static str, Home)>,
     period_ns: f64,
     mask: u64,
 }
 
 impl Profiler {
-    pub fn new(host: &Host) -> Result<Option<Profiler>, Error> {
+    /// Without room: a plan says how much it needs.
+    pub fn new(host: &Host) -> Option<Profiler> {
         let limits = host.limits();
-        let Some(period) = limits.timestamp_period else { return Ok(None) };
-        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * SCOPES);
+        let period_ns = f64::from(limits.timestamp_period?);
+        Some(Profiler { pool: vk::QueryPool::null(), room: 0, names: Vec::new(), period_ns, mask: limits.timestamp_mask })
+    }
+
+    /// Makes room for so many scopes; the slot's last frame has completed.
+    pub fn fit(&mut self, host: &Host, scopes: u32) -> Result<(), Error> {
+        if self.room >= scopes {
+            return Ok(());
+        }
+        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * scopes);
         // SAFETY: complete info on a live device.
         let pool = unsafe { host.device.create_query_pool(&info, None) }.map_err(Error::vulkan("timestamps"))?;
-        Ok(Some(Profiler { pool, names: Vec::new(), period_ns: f64::from(period), mask: limits.timestamp_mask }))
+        self.destroy(&host.device);
+        (self.pool, self.room) = (pool, scopes);
+        self.names.clear();
+        Ok(())
     }
 
     pub fn begin_frame(&mut self, device: &ash::Device, cmd: vk::CommandBuffer) {
         self.names.clear();
-        // SAFETY: the slot's last frame has completed (contract), and `cmd` is recording outside rendering.
-        unsafe { device.cmd_reset_query_pool(cmd, self.pool, 0, 2 * SCOPES) };
+        if self.room > 0 {
+            // SAFETY: the slot's last frame has completed (contract), and `cmd` is recording outside rendering.
+            unsafe { device.cmd_reset_query_pool(cmd, self.pool, 0, 2 * self.room) };
+        }
     }
 
     /// What was recorded of this frame will never run: there is nothing to read.
@@ -52,11 +67,9 @@ impl Profiler {
         self.names.clear();
     }
 
-    pub fn begin(&mut self, device: &ash::Device, cmd: vk::CommandBuffer, name: &str) {
-        if (self.names.len() as u32) < SCOPES {
-            self.names.push(name.into());
-            self.stamp(device, cmd, 2 * (self.names.len() as u32 - 1));
-        }
+    pub fn begin(&mut self, device: &ash::Device, cmd: vk::CommandBuffer, name: &'static str, home: Home) {
+        self.names.push((name, home));
+        self.stamp(device, cmd, 2 * (self.names.len() as u32 - 1));
     }
 
     pub fn end(&mut self, device: &ash::Device, cmd: vk::CommandBuffer) {
@@ -64,7 +77,7 @@ impl Profiler {
     }
 
     fn stamp(&self, device: &ash::Device, cmd: vk::CommandBuffer, query: u32) {
-        // SAFETY: `query` is inside the pool, reset in this frame, and written once.
+        // SAFETY: `query` is inside the pool, which has room for every scope of the plan, reset in this frame, and written once.
         unsafe { device.cmd_write_timestamp2(cmd, vk::PipelineStageFlags2::ALL_COMMANDS, self.pool, query) };
     }
 
@@ -81,7 +94,11 @@ impl Profiler {
             .names
             .iter()
             .zip(ticks.chunks(2))
-            .map(|(n, t)| PassTime { name: n.clone(), ms: ms(t[0], t[1]) })
+            .map(|((name, home), t)| PassTime {
+                name: (*name).to_owned(),
+                ms: ms(t[0], t[1]),
+                prepares: *home == Home::Particles,
+            })
             .collect();
         Some(FrameTimes { passes, span_ms: ms(ticks[0], ticks[ticks.len() - 1]) })
     }

@@ -1,110 +1,21 @@
-//! Records passes: each says what it reads and writes, and gets its barriers, descriptors, label and timestamps.
+//! Records a plan: each step gets its barriers, each pass its label and timestamps, each call its pipeline and set.
 
 use crate::{
     Error,
     access::{Access, Barrier, State},
     device::Host,
-    input::{Background, EnvironmentShape, SceneInput},
-    pipeline::Pipeline,
+    input::SceneInput,
+    pipeline::{Pipeline, Pipelines},
+    plan::{Call, External, Groups, Home, Made, Plan, Rendering, Step, Target, Vertices, Work},
     profile::Profiler,
-    resources::{Buffer, Image, Resource, Retired},
-    shader::Kind,
-    targets::{Id, Needs, Spec},
+    resources::Resource,
+    shader::{Binding, Kind},
+    table::Table,
 };
 use ash::vk;
-use gpu_allocator::MemoryLocation;
-use std::collections::BTreeMap;
 
-/// One resource a pass touches, and where its shader sees it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Use {
-    pub id: Id,
-    pub access: Access,
-    pub binding: Option<u32>,
-}
-
-/// A resource that the shader sees at a binding of set 0.
-pub(crate) const fn bound(binding: u32, id: Id, access: Access) -> Use {
-    Use { id, access, binding: Some(binding) }
-}
-
-/// A resource used otherwise: attachment, indirect arguments, copy.
-pub(crate) const fn used(id: Id, access: Access) -> Use {
-    Use { id, access, binding: None }
-}
-
-struct Entry {
-    resource: Resource,
-    spec: Spec,
-    state: State,
-}
-
-/// The renderer's own resources, with the state each is in.
-#[derive(Default)]
-pub(crate) struct Table(BTreeMap<Id, Entry>);
-
-impl Table {
-    /// Makes what `needs` asks for and is not there, retires what it no longer asks for.
-    pub fn fit(&mut self, host: &Host, needs: &Needs, retired: &mut Retired, frame: u64) -> Result<(), Error> {
-        for id in Id::OWN {
-            let spec = needs.spec(id);
-            if self.0.get(&id).map(|e| e.spec) == spec {
-                continue;
-            }
-            if let Some(old) = self.0.remove(&id) {
-                retired.push(frame, old.resource);
-            }
-            let Some(spec) = spec else { continue };
-            let resource = match &spec {
-                Spec::Image(image) => Resource::Image(Image::new(host, id.name(), image)?),
-                Spec::Buffer { bytes, usage } => {
-                    Resource::Buffer(Buffer::new(host, id.name(), *bytes, *usage, MemoryLocation::GpuOnly)?)
-                }
-            };
-            self.0.insert(id, Entry { resource, spec, state: State::default() });
-        }
-        Ok(())
-    }
-
-    /// Whether all that is asked for is there.
-    pub fn fits(&self, needs: &Needs) -> bool {
-        Id::OWN.into_iter().all(|id| self.spec(id) == needs.spec(id))
-    }
-
-    /// Forgets contents: every frame makes everything anew.
-    pub fn discard_contents(&mut self) {
-        self.0.values_mut().for_each(|e| e.state.discard());
-    }
-
-    pub fn get(&self, id: Id) -> Option<&Resource> {
-        self.0.get(&id).map(|e| &e.resource)
-    }
-
-    pub fn spec(&self, id: Id) -> Option<Spec> {
-        self.0.get(&id).map(|e| e.spec)
-    }
-
-    /// Driver's size of each resource.
-    pub fn ledger(&self) -> Vec<crate::targets::LedgerEntry> {
-        let bytes = |r: &Resource| match r {
-            Resource::Image(i) => i.bytes,
-            Resource::Buffer(b) => b.bytes,
-        };
-        self.0
-            .iter()
-            .map(|(id, e)| crate::targets::LedgerEntry { name: id.name(), bytes: bytes(&e.resource) })
-            .collect()
-    }
-
-    pub fn retire_all(&mut self, retired: &mut Retired, frame: u64) {
-        for (_, e) in std::mem::take(&mut self.0) {
-            retired.push(frame, e.resource);
-        }
-    }
-}
-
-/// What the frame uses and does not own, or owns per slot; none of it needs barriers from us.
-#[derive(Clone, Copy)]
+/// What a frame uses and does not own, or owns per slot.
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Externals {
     pub frame_block: vk::Buffer,
     /// Buffer, offset and range of the host's positions.
@@ -112,14 +23,13 @@ pub(crate) struct Externals {
     /// Centres and shapes, where the host prepared them.
     pub particles: [vk::Buffer; 3],
     pub environment: (vk::ImageView, vk::ImageLayout),
-    pub environment_shape: EnvironmentShape,
     pub scene: Option<SceneInput>,
-    pub background: Background,
     pub output: vk::ImageView,
 }
 
 /// One barrier of a recorded frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PlanEntry {
     /// The pass it stands before.
     pub pass: &'static str,
@@ -139,158 +49,195 @@ impl std::fmt::Display for PlanEntry {
 pub(crate) struct Recorder<'a> {
     pub host: &'a Host,
     pub cmd: vk::CommandBuffer,
-    pub table: &'a mut Table,
+    pub plan: &'a Plan,
+    pub pipelines: &'a Pipelines,
+    /// Of the particles, and of the view.
+    pub tables: [&'a mut Table; 2],
     pub externals: Externals,
     pub pool: vk::DescriptorPool,
     pub profiler: Option<&'a mut Profiler>,
-    pub plan: &'a mut Vec<PlanEntry>,
-    pub size: [u32; 2],
+    pub barriers: &'a mut Vec<PlanEntry>,
     /// What has happened to the frame block since the host wrote it.
     pub frame_block: State,
 }
 
 impl Recorder<'_> {
-    /// One pass: label, timestamps, the barriers that its uses need, then `body`.
-    pub fn pass(
-        &mut self,
-        name: &'static str,
-        uses: &[Use],
-        body: impl FnOnce(&mut Self) -> Result<(), Error>,
+    /// Records every step.
+    pub fn record(mut self) -> Result<(), Error> {
+        let plan = self.plan;
+        for pass in plan.steps.chunk_by(|a, b| a.pass == b.pass) {
+            let name = pass[0].pass;
+            if let Some(utils) = &self.host.debug_utils {
+                let label = std::ffi::CString::new(format!("meniscus {name}")).unwrap_or_default();
+                // SAFETY: `cmd` is recording (contract of `Renderer::record`); the label outlives the call.
+                unsafe {
+                    utils.cmd_begin_debug_utils_label(self.cmd, &vk::DebugUtilsLabelEXT::default().label_name(&label))
+                };
+            }
+            if let Some(p) = &mut self.profiler {
+                p.begin(&self.host.device, self.cmd, name, pass[0].home);
+            }
+            let recorded = pass.iter().try_for_each(|step| self.step(step));
+            if let Some(p) = &mut self.profiler {
+                p.end(&self.host.device, self.cmd);
+            }
+            if let Some(utils) = &self.host.debug_utils {
+                // SAFETY: closes the label begun above.
+                unsafe { utils.cmd_end_debug_utils_label(self.cmd) };
+            }
+            recorded?;
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, step: &Step) -> Result<(), Error> {
+        self.barriers(step.pass, &step.uses)?;
+        let (device, cmd) = (&self.host.device, self.cmd);
+        match &step.work {
+            Work::Fill { buffer, offset, bytes, word } => {
+                let handle = self.buffer(*buffer)?.0;
+                // SAFETY: `cmd` is recording outside rendering; the range lies inside the buffer, whose use as the
+                // destination of a transfer was declared with this step.
+                unsafe { device.cmd_fill_buffer(cmd, handle, *offset, *bytes, *word) };
+            }
+            Work::Dispatch { call, groups } => {
+                self.bind(step.pass, call)?;
+                match groups {
+                    // SAFETY: a compute pipeline, its set and its constants are bound.
+                    Groups::Direct([x, y, z]) => unsafe { device.cmd_dispatch(cmd, *x, *y, *z) },
+                    Groups::Indirect(arguments, offset) => {
+                        let handle = self.buffer(*arguments)?.0;
+                        // SAFETY: as above; the arguments were declared as such with this step.
+                        unsafe { device.cmd_dispatch_indirect(cmd, handle, *offset) };
+                    }
+                }
+            }
+            Work::Render { rendering, draws } => {
+                self.begin_rendering(rendering)?;
+                let drawn = draws.iter().try_for_each(|(call, vertices)| self.draw(step.pass, rendering, call, vertices));
+                // SAFETY: ends the rendering begun above.
+                unsafe { device.cmd_end_rendering(cmd) };
+                drawn?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw(
+        &self,
+        pass: &'static str,
+        rendering: &Rendering,
+        call: &Call,
+        vertices: &Vertices,
     ) -> Result<(), Error> {
-        if let Some(utils) = &self.host.debug_utils {
-            let label = std::ffi::CString::new(format!("meniscus {name}")).unwrap_or_default();
-            // SAFETY: `cmd` is recording (contract of `Renderer::record`); the label outlives the call.
-            unsafe {
-                utils.cmd_begin_debug_utils_label(self.cmd, &vk::DebugUtilsLabelEXT::default().label_name(&label))
-            };
+        let (device, cmd) = (&self.host.device, self.cmd);
+        self.bind(pass, call)?;
+        if let Some(depth) = &rendering.depth {
+            // SAFETY: `cmd` is recording, and the pipeline has this state as a dynamic one.
+            unsafe { device.cmd_set_depth_compare_op(cmd, depth.compare) };
         }
-        if let Some(p) = &mut self.profiler {
-            p.begin(&self.host.device, self.cmd, name);
+        match vertices {
+            // SAFETY: inside rendering, with a graphics pipeline, its set and its constants bound.
+            Vertices::Direct(count) => unsafe { device.cmd_draw(cmd, *count, 1, 0, 0) },
+            Vertices::Indirect(arguments, offset) => {
+                let handle = self.buffer(*arguments)?.0;
+                // SAFETY: as above; the arguments were declared as such with this step.
+                unsafe { device.cmd_draw_indirect(cmd, handle, *offset, 1, 0) };
+            }
         }
-        self.barriers(name, uses);
-        if !uses.iter().any(|u| u.id == Id::FrameBlock) {
-            self.barriers(name, &[used(Id::FrameBlock, Access::UniformRead)]);
-        }
-        let result = body(self);
-        if let Some(p) = &mut self.profiler {
-            p.end(&self.host.device, self.cmd);
-        }
-        if let Some(utils) = &self.host.debug_utils {
-            // SAFETY: closes the label begun above.
-            unsafe { utils.cmd_end_debug_utils_label(self.cmd) };
-        }
-        result
+        Ok(())
     }
 
     /// Emits what the declared uses need, as one pipeline barrier.
-    pub fn barriers(&mut self, pass: &'static str, uses: &[Use]) {
+    pub fn barriers(&mut self, pass: &'static str, uses: &[(Target, Access)]) -> Result<(), Error> {
         let (mut images, mut buffers) = (Vec::new(), Vec::new());
-        for u in uses {
-            if u.id == Id::FrameBlock {
-                if let Some(barrier) = self.frame_block.step(u.access, false) {
-                    self.plan.push(PlanEntry { pass, resource: u.id.name(), barrier });
-                    buffers.push(barrier.on_buffer(self.externals.frame_block));
+        for (target, access) in uses {
+            let declared = self.plan.resource(*target);
+            let name = declared.name;
+            let mut note = |barrier| self.barriers.push(PlanEntry { pass, resource: name, barrier });
+            match declared.made {
+                Made::Given(External::FrameBlock) => {
+                    if let Some(barrier) = self.frame_block.step(*access, false) {
+                        note(barrier);
+                        buffers.push(barrier.on_buffer(self.externals.frame_block));
+                    }
                 }
-                continue;
-            }
-            let Some(entry) = self.table.0.get_mut(&u.id) else { continue };
-            let is_image = matches!(entry.resource, Resource::Image(_));
-            let Some(barrier) = entry.state.step(u.access, is_image) else { continue };
-            self.plan.push(PlanEntry { pass, resource: u.id.name(), barrier });
-            match &entry.resource {
-                Resource::Image(image) => images.push(barrier.on_image(image.handle, image.aspect)),
-                Resource::Buffer(buffer) => buffers.push(barrier.on_buffer(buffer.handle)),
+                // The host's own, and what only the host has written.
+                Made::Given(_) => {}
+                Made::Own(_) => {
+                    let table = &mut self.tables[usize::from(declared.home == Home::View)];
+                    let entry = table.get_mut(name).ok_or_else(|| absent(pass, name))?;
+                    let is_image = matches!(entry.resource, Resource::Image(_));
+                    let Some(barrier) = entry.state.step(*access, is_image) else { continue };
+                    note(barrier);
+                    match &entry.resource {
+                        Resource::Image(image) => images.push(barrier.on_image(image.handle, image.aspect)),
+                        Resource::Buffer(buffer) => buffers.push(barrier.on_buffer(buffer.handle)),
+                    }
+                }
             }
         }
         if images.is_empty() && buffers.is_empty() {
-            return;
+            return Ok(());
         }
         let info = vk::DependencyInfo::default().image_memory_barriers(&images).buffer_memory_barriers(&buffers);
         // SAFETY: `cmd` is recording outside rendering; the handles are alive and the layouts tracked.
         unsafe { self.host.device.cmd_pipeline_barrier2(self.cmd, &info) };
+        Ok(())
     }
 
-    /// Binds a pipeline and a descriptor set with the uses that have a binding; binding 0 is the frame block.
-    pub fn bind(&mut self, pipeline: &Pipeline, uses: &[Use]) -> Result<(), Error> {
-        let layouts = [pipeline.set_layout];
-        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&layouts);
-        // SAFETY: the pool belongs to this slot, whose last frame has completed.
-        let set =
-            unsafe { self.host.device.allocate_descriptor_sets(&info) }.map_err(Error::vulkan("descriptor set"))?[0];
-        let frame_block = bound(0, Id::FrameBlock, Access::ComputeRead);
-        let mut image_infos = Vec::with_capacity(pipeline.bindings.len());
-        let mut buffer_infos = Vec::with_capacity(pipeline.bindings.len());
-        // Samplers are part of the layout.
-        for b in pipeline.bindings.iter().filter(|b| b.kind != Kind::Sampler) {
-            let u = if b.index == 0 { Some(&frame_block) } else { uses.iter().find(|u| u.binding == Some(b.index)) };
-            let u = u
-                .unwrap_or_else(|| panic!("a pass declares nothing for its shader's binding {} ({})", b.index, b.name));
-            match b.kind {
-                Kind::SampledImage | Kind::StorageImage => {
-                    let (view, layout) = self.view(u);
-                    image_infos.push((b, [vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)]));
-                }
-                Kind::UniformBuffer | Kind::StorageBuffer => {
-                    let (buffer, offset, range) = match u.id {
-                        Id::Positions => self.externals.positions,
-                        id => (self.buffer(id), 0, vk::WHOLE_SIZE),
-                    };
-                    let info = vk::DescriptorBufferInfo { buffer, offset, range };
-                    buffer_infos.push((b, [info]));
-                }
-                Kind::Sampler => {}
+    /// Binds a call's pipeline, a descriptor set of what it names, and its push constants.
+    fn bind(&self, pass: &'static str, call: &Call) -> Result<(), Error> {
+        let (device, cmd) = (&self.host.device, self.cmd);
+        let missing = || Error::Pass { pass, problem: format!("no pipeline of {}", call.recipe.name()) };
+        let pipeline = self.pipelines.get(&call.recipe).ok_or_else(missing)?;
+        let set = self.descriptor_set(pipeline, call)?;
+        // SAFETY: `cmd` is recording; pipeline and set are alive and belong together; the block is as long as the
+        // layout's range.
+        unsafe {
+            device.cmd_bind_pipeline(cmd, pipeline.bind_point, pipeline.handle);
+            device.cmd_bind_descriptor_sets(cmd, pipeline.bind_point, pipeline.layout, 0, &[set], &[]);
+            if !call.push.is_empty() {
+                device.cmd_push_constants(cmd, pipeline.layout, pipeline.stages, 0, &call.push);
             }
         }
-        let mut writes = Vec::with_capacity(pipeline.bindings.len());
-        let write = |b: &crate::shader::Binding| {
+        Ok(())
+    }
+
+    fn descriptor_set(&self, pipeline: &Pipeline, call: &Call) -> Result<vk::DescriptorSet, Error> {
+        let device = &self.host.device;
+        let layouts = [pipeline.set_layout];
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&layouts);
+        // SAFETY: the pool belongs to this slot, whose last frame has completed, and was made for this plan.
+        let set = unsafe { device.allocate_descriptor_sets(&info) }.map_err(Error::vulkan("descriptor set"))?[0];
+        let (mut image_infos, mut buffer_infos) = (Vec::new(), Vec::new());
+        for (b, target, access) in &call.bound {
+            match b.kind {
+                Kind::SampledImage(_) | Kind::StorageImage(_) => {
+                    let (view, layout) = self.view(*target, *access)?;
+                    image_infos.push((b, [vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)]));
+                }
+                _ => {
+                    let (buffer, offset, range) = self.buffer(*target)?;
+                    buffer_infos.push((b, [vk::DescriptorBufferInfo { buffer, offset, range }]));
+                }
+            }
+        }
+        let write = |b: &Binding| {
             vk::WriteDescriptorSet::default()
                 .dst_set(set)
                 .dst_binding(b.index)
                 .descriptor_type(b.kind.descriptor_type())
         };
-        writes.extend(image_infos.iter().map(|(b, info)| write(b).image_info(info)));
-        writes.extend(buffer_infos.iter().map(|(b, info)| write(b).buffer_info(info)));
-        // SAFETY: the set is new, so not in use; views and buffers are alive; `cmd` is recording.
-        unsafe {
-            self.host.device.update_descriptor_sets(&writes, &[]);
-            self.host.device.cmd_bind_pipeline(self.cmd, pipeline.bind_point, pipeline.handle);
-            self.host.device.cmd_bind_descriptor_sets(self.cmd, pipeline.bind_point, pipeline.layout, 0, &[set], &[]);
-        }
-        Ok(())
+        let images = image_infos.iter().map(|(b, info)| write(b).image_info(info));
+        let buffers = buffer_infos.iter().map(|(b, info)| write(b).buffer_info(info));
+        let writes: Vec<_> = images.chain(buffers).collect();
+        // SAFETY: the set is new, so not in use; views and buffers are alive.
+        unsafe { device.update_descriptor_sets(&writes, &[]) };
+        Ok(set)
     }
 
-    pub fn push<T: bytemuck::Pod>(&mut self, pipeline: &Pipeline, constants: &T) {
-        // SAFETY: the pipeline's layout has a push range of T's size, for these stages.
-        unsafe {
-            self.host.device.cmd_push_constants(
-                self.cmd,
-                pipeline.layout,
-                pipeline.stages,
-                0,
-                bytemuck::bytes_of(constants),
-            )
-        };
-    }
-
-    pub fn dispatch(&mut self, x: u32, y: u32, z: u32) {
-        // SAFETY: a compute pipeline and its set are bound.
-        unsafe { self.host.device.cmd_dispatch(self.cmd, x, y, z) };
-    }
-
-    /// A dispatch whose group counts were written into a buffer.
-    pub fn dispatch_indirect(&mut self, arguments: Id, offset: u64) {
-        // SAFETY: a compute pipeline and its set are bound; the arguments were declared `IndirectRead`.
-        unsafe { self.host.device.cmd_dispatch_indirect(self.cmd, self.buffer(arguments), offset) };
-    }
-
-    /// Rendering into one layer of each colour target, cleared to zero, or into the host's output, which keeps what it
-    /// holds where the background is the host's; `depth`: the depth test's clear value.
-    pub fn render(
-        &mut self,
-        colors: &[(Id, usize)],
-        depth: Option<f32>,
-        body: impl FnOnce(&mut Self) -> Result<(), Error>,
-    ) -> Result<(), Error> {
+    fn begin_rendering(&self, rendering: &Rendering) -> Result<(), Error> {
         let attachment = |view, layout, load, value| {
             vk::RenderingAttachmentInfo::default()
                 .image_view(view)
@@ -300,75 +247,88 @@ impl Recorder<'_> {
                 .clear_value(value)
         };
         let zero = vk::ClearValue { color: vk::ClearColorValue { uint32: [0; 4] } };
-        let color_infos: Vec<_> = colors
-            .iter()
-            .map(|(id, layer)| {
-                let (view, load) = match self.table.get(*id) {
-                    Some(Resource::Image(i)) => (i.layers[*layer], vk::AttachmentLoadOp::CLEAR),
-                    _ if self.externals.background == Background::Host => {
-                        (self.externals.output, vk::AttachmentLoadOp::LOAD)
-                    }
-                    _ => (self.externals.output, vk::AttachmentLoadOp::CLEAR),
-                };
-                attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, load, zero)
-            })
-            .collect();
-        let area = vk::Rect2D {
-            offset: vk::Offset2D::default(),
-            extent: vk::Extent2D { width: self.size[0], height: self.size[1] },
-        };
-        let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color_infos);
+        let mut colors = Vec::with_capacity(rendering.colors.len());
+        for color in &rendering.colors {
+            let load = if color.keep { vk::AttachmentLoadOp::LOAD } else { vk::AttachmentLoadOp::CLEAR };
+            let view = self.layer(color.target, color.layer)?;
+            colors.push(attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, load, zero));
+        }
+        let [width, height] = rendering.colors.first().map_or(self.plan.size, |c| self.plan.attachment_size(c.target));
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
+        let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&colors);
         let depth_info;
-        if let (Some(value), Some(Resource::Image(i))) = (depth, self.table.get(Id::SplatDepth)) {
-            let clear = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: value, stencil: 0 } };
+        if let Some(depth) = &rendering.depth {
+            let clear = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: depth.clear, stencil: 0 } };
             let layout = vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL;
-            depth_info = attachment(i.view, layout, vk::AttachmentLoadOp::CLEAR, clear)
+            depth_info = attachment(self.layer(depth.target, 0)?, layout, vk::AttachmentLoadOp::CLEAR, clear)
                 .store_op(vk::AttachmentStoreOp::DONT_CARE);
             info = info.depth_attachment(&depth_info);
         }
-        let viewport = vk::Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: self.size[0] as f32,
-            height: self.size[1] as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        };
+        let viewport =
+            vk::Viewport { x: 0.0, y: 0.0, width: width as f32, height: height as f32, min_depth: 0.0, max_depth: 1.0 };
         // SAFETY: the attachments are alive, in the stated layouts (declared by the pass), and of this size.
         unsafe {
             self.host.device.cmd_begin_rendering(self.cmd, &info);
             self.host.device.cmd_set_viewport(self.cmd, 0, &[viewport]);
             self.host.device.cmd_set_scissor(self.cmd, 0, &[area]);
         }
-        let result = body(self);
-        // SAFETY: ends the rendering begun above.
-        unsafe { self.host.device.cmd_end_rendering(self.cmd) };
-        result
+        Ok(())
     }
 
-    pub fn buffer(&self, id: Id) -> vk::Buffer {
-        match (id, self.table.get(id)) {
-            (Id::FrameBlock, _) => self.externals.frame_block,
-            (_, Some(Resource::Buffer(b))) => b.handle,
-            (Id::Centers, _) => self.externals.particles[0],
-            (Id::Diagonals, _) => self.externals.particles[1],
-            (Id::Mixed, _) => self.externals.particles[2],
-            _ => panic!("a pass asks for the buffer {id:?}, which this frame does without"),
+    fn own(&self, target: Target) -> Result<&Resource, Error> {
+        let declared = self.plan.resource(target);
+        let table = &self.tables[usize::from(declared.home == Home::View)];
+        table.get(declared.name).map(|e| &e.resource).ok_or_else(|| absent("recording", declared.name))
+    }
+
+    /// A buffer, and what of it is bound.
+    fn buffer(&self, target: Target) -> Result<(vk::Buffer, u64, u64), Error> {
+        let [centers, diagonals, mixed] = self.externals.particles;
+        let all = |buffer| Ok((buffer, 0, vk::WHOLE_SIZE));
+        match self.plan.resource(target).made {
+            Made::Given(External::FrameBlock) => all(self.externals.frame_block),
+            Made::Given(External::Positions) => Ok(self.externals.positions),
+            Made::Given(External::Centers) => all(centers),
+            Made::Given(External::Diagonals) => all(diagonals),
+            Made::Given(External::Mixed) => all(mixed),
+            _ => match self.own(target)? {
+                Resource::Buffer(b) => all(b.handle),
+                Resource::Image(_) => Err(absent("recording", self.plan.resource(target).name)),
+            },
         }
     }
 
-    fn view(&self, u: &Use) -> (vk::ImageView, vk::ImageLayout) {
-        if let Some(scene) = &self.externals.scene {
-            match u.id {
-                Id::SceneColor => return (scene.color, scene.color_layout),
-                Id::SceneDepth => return (scene.depth, scene.depth_layout),
-                _ => {}
+    /// An image as shaders see it, and the layout it is in then.
+    fn view(&self, target: Target, access: Access) -> Result<(vk::ImageView, vk::ImageLayout), Error> {
+        let absent = || absent("recording", self.plan.resource(target).name);
+        match self.plan.resource(target).made {
+            Made::Given(External::Environment) => Ok(self.externals.environment),
+            Made::Given(External::SceneColor) => {
+                self.externals.scene.map(|s| (s.color, s.color_layout)).ok_or_else(absent)
             }
-        }
-        match (u.id, self.table.get(u.id)) {
-            (Id::Environment, _) => self.externals.environment,
-            (_, Some(Resource::Image(i))) => (i.view, u.access.flags().2),
-            _ => panic!("a pass asks for the image {:?}, which this frame does without", u.id),
+            Made::Given(External::SceneDepth) => {
+                self.externals.scene.map(|s| (s.depth, s.depth_layout)).ok_or_else(absent)
+            }
+            _ => match self.own(target)? {
+                Resource::Image(i) => Ok((i.view, access.flags().2)),
+                Resource::Buffer(_) => Err(absent()),
+            },
         }
     }
+
+    /// One layer of an image, to be drawn into.
+    fn layer(&self, target: Target, layer: u32) -> Result<vk::ImageView, Error> {
+        let name = self.plan.resource(target).name;
+        match self.plan.resource(target).made {
+            Made::Given(External::Output(_)) => Ok(self.externals.output),
+            _ => match self.own(target)? {
+                Resource::Image(i) => i.layers.get(layer as usize).copied().ok_or_else(|| absent("recording", name)),
+                Resource::Buffer(_) => Err(absent("recording", name)),
+            },
+        }
+    }
+}
+
+fn absent(pass: &'static str, name: &str) -> Error {
+    Error::Pass { pass, problem: format!("{name} is declared, and not there") }
 }

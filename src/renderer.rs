@@ -3,22 +3,24 @@
 mod uploads;
 
 use crate::{
-    Error, access,
+    Error, Settings, access,
     device::{self, Host, Limits},
-    frame,
+    frame::{self, Preparation, Scene},
     input::{Background, EnvironmentInput, EnvironmentShape, FrameInput},
-    passes::Passes,
-    prepare::DevicePositions,
+    passes::shape::LAST_CLASSES,
+    pipeline::Pipelines,
+    plan::{Home, Made, Plan, Recipe},
+    prepare::{DevicePositions, Search},
     profile::FrameTimes,
-    recorder::{Externals, PlanEntry, Recorder, Table, used},
-    resources::{Buffer, Image, Resource, Retired},
-    settings::Settings,
+    recorder::{Externals, PlanEntry, Recorder},
+    resources::{Buffer, Image, Resource, Retired, Spec},
     slot::Slot,
     space::{self, Space},
-    targets::{self, Id, LedgerEntry, Needs, Preparation, Spec},
+    table::{self, LedgerEntry, Table},
 };
 use ash::vk;
 use glam::{Vec3, Vec4};
+use std::collections::HashSet;
 use uploads::PARTICLE_ARRAYS;
 
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
@@ -27,11 +29,13 @@ use uploads::PARTICLE_ARRAYS;
 /// because dropping must not wait and cannot know what is still in flight.
 #[must_use = "call Renderer::destroy when the device is idle"]
 pub struct Renderer {
-    host: Host,
+    pub(crate) host: Host,
     limits: Limits,
     size: [u32; 2],
-    passes: Passes,
-    table: Table,
+    output: vk::Format,
+    pipelines: Pipelines,
+    /// Of the particles, and of the view.
+    pub(crate) tables: [Table; 2],
     slots: Vec<Slot>,
     retired: Retired,
     frame: u64,
@@ -39,9 +43,26 @@ pub struct Renderer {
     particles: Option<[Buffer; 3]>,
     scene: SceneBounds,
     environment: Option<Image>,
-    plan: Vec<PlanEntry>,
-    /// The buffer that holds the last frame's classes, if that frame kept them.
-    last_classes: Option<vk::Buffer>,
+    pub(crate) barriers: Vec<PlanEntry>,
+    /// What is also written, for dumps and statistics.
+    #[cfg(feature = "inspect")]
+    pub(crate) inspection: crate::inspect::Inspection,
+    /// Whether the last frame left classes.
+    last_classes: bool,
+}
+
+/// How many particles frames will draw.
+#[derive(Clone, Copy, Debug)]
+pub enum Amount<'a> {
+    /// Prepared on the host.
+    Prepared {
+        /// On their own.
+        splash: usize,
+        /// Of the body.
+        body: usize,
+    },
+    /// Prepared on the device.
+    OnDevice(&'a DevicePositions),
 }
 
 /// What the renderer remembers of the particles it was given.
@@ -62,7 +83,7 @@ impl Renderer {
     /// * The device was created with [`device::required_features`], and with `largePoints` if `host` says so.
     pub unsafe fn new(host: Host, output: vk::Format) -> Result<Renderer, Error> {
         device::check(&host.instance, host.physical_device, host.queue_family)?;
-        if crate::passes::refract::takes_linear(output).is_none() {
+        if crate::optics::walk::takes_linear(output).is_none() {
             let remedy = "use an RGBA float, UNORM or sRGB format";
             return Err(Error::parameter("output format", format!("{output:?}"), remedy));
         }
@@ -73,11 +94,12 @@ impl Renderer {
         }
         let limits = host.limits();
         let mut renderer = Renderer {
-            passes: Passes::new(&limits, output),
             host,
+            output,
+            pipelines: Pipelines::default(),
             limits,
             size: [0, 0],
-            table: Table::default(),
+            tables: Default::default(),
             slots: Vec::new(),
             retired: Retired::default(),
             frame: 0,
@@ -89,8 +111,10 @@ impl Renderer {
                 bounds: (Vec3::ZERO, Vec3::ZERO),
             },
             environment: None,
-            plan: Vec::new(),
-            last_classes: None,
+            barriers: Vec::new(),
+            #[cfg(feature = "inspect")]
+            inspection: Default::default(),
+            last_classes: false,
         };
         for _ in 0..renderer.host.frames_in_flight {
             match Slot::new(&renderer.host) {
@@ -121,60 +145,102 @@ impl Renderer {
         Ok(())
     }
 
-    /// Device memory that frames take, resource by resource, before anything is allocated. The particle buffer is
-    /// extra: 36 bytes a particle; a static environment map 16 bytes a texel.
-    pub fn memory_requirements(&self, needs: &Needs) -> Result<Vec<LedgerEntry>, Error> {
-        self.check_size(needs.size)?;
-        Ok(targets::ledger(&self.host.device, needs))
+    /// Device memory that frames of a size take, resource by resource, before anything is allocated. Particles that the
+    /// host prepared are extra, 36 bytes each, and a static environment map, 16 bytes a texel.
+    pub fn memory_requirements(
+        &self,
+        size: [u32; 2],
+        amount: Amount,
+        settings: &Settings,
+    ) -> Result<Vec<LedgerEntry>, Error> {
+        self.check_size(size)?;
+        settings.validate()?;
+        let mut scene = Scene::new(settings, size, [0, 0], &self.limits);
+        self.fill(&mut scene, amount)?;
+        Ok(table::ledger(&self.host.device, &frame::plan(&scene)?))
     }
 
     /// Device memory in use now, resource by resource.
     pub fn memory(&self) -> Vec<LedgerEntry> {
-        let mut ledger = self.table.ledger();
+        let mut ledger: Vec<_> = self.tables.iter().flat_map(Table::ledger).collect();
+        let entry = |name, bytes, per_particle| LedgerEntry { name, bytes, per_particle };
         let particles = PARTICLE_ARRAYS.into_iter().zip(self.particles.iter().flatten());
-        ledger.extend(particles.map(|(id, b)| LedgerEntry { name: id.name(), bytes: b.bytes }));
-        ledger.extend(self.environment.iter().map(|i| LedgerEntry { name: Id::Environment.name(), bytes: i.bytes }));
+        ledger.extend(particles.map(|(name, b)| entry(name, b.bytes, true)));
+        ledger.extend(self.environment.iter().map(|i| entry("environment", i.bytes, false)));
         ledger
     }
 
-    /// What the next frame with these settings needs.
-    pub fn needs(&self, settings: &Settings, debug: bool) -> Needs {
-        let mut needs = Needs::new(self.size, self.scene.splash, self.scene.body, settings, debug);
-        // Culling only saves time: where its bounds do not fit a storage buffer, everything is drawn.
-        needs.occlusion &= 8 * u64::from(self.size[0]) * u64::from(self.size[1]) <= self.limits.storage_size;
-        needs
-    }
-
-    /// What a frame needs that prepares positions on the device: both classes, since only the device will know whether
-    /// there are particles of each.
-    pub fn needs_on_device(
-        &self,
-        settings: &Settings,
-        positions: &DevicePositions,
-        debug: bool,
-        neighbours: u32,
-    ) -> Result<Needs, Error> {
-        let mut needs = self.needs(settings, debug);
-        needs.count = positions.count;
-        (needs.splash, needs.body) = (positions.count > 0, positions.count > 0);
-        needs.prepare = (positions.count > 0).then(|| Preparation {
-            entries: positions.entries(),
-            keep_classes: positions.keep_class_below.is_some(),
-            neighbours,
-        });
-        let largest = self.limits.storage_size;
-        let asked = BINDING_ALIGNMENT + positions.stride * u64::from(positions.count);
-        let buffers = Id::OWN.into_iter().filter_map(|id| match needs.spec(id)? {
-            Spec::Buffer { bytes, .. } => Some((id.name(), bytes)),
-            Spec::Image(_) => None,
-        });
-        for (name, bytes) in buffers.chain([(Id::Positions.name(), asked)]) {
-            if bytes > largest || positions.entries() > u64::from(u32::MAX) {
-                let remedy = format!("{name} would take {bytes} bytes; this device binds {largest} at most");
-                return Err(Error::parameter("particles", positions.count, remedy));
+    /// Compiles what frames with these settings need, on all cores, so that recording them compiles nothing: whatever
+    /// their particles and their background, with and without a scene. Says how many pipelines that were.
+    ///
+    /// Frames differ in more than that: positions on the device (`positions`) and what the environment is (`shapes`).
+    pub fn warm_up(&mut self, settings: &Settings) -> Result<usize, Error> {
+        settings.validate()?;
+        let mut plans = Vec::new();
+        for (has_scene, background) in [
+            (false, Background::Environment),
+            (true, Background::Environment),
+            (false, Background::Host),
+            (true, Background::Host),
+        ] {
+            for environment in [EnvironmentShape::Equirect, EnvironmentShape::Cube] {
+                for classes in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+                    let mut scene = Scene::new(settings, [1, 1], classes, &self.limits);
+                    scene.output = self.output;
+                    (scene.has_scene, scene.background, scene.environment) = (has_scene, background, environment);
+                    plans.push(frame::plan(&scene)?);
+                }
             }
         }
-        Ok(needs)
+        for search in [Search::Runs, Search::Relation] {
+            for keep_class_below in [None, Some(1.0)] {
+                let mut positions = DevicePositions::packed(vk::Buffer::null(), 1, 1.0);
+                positions.options.search = search;
+                positions.keep_class_below = keep_class_below;
+                let mut scene = Scene::new(settings, [1, 1], [0, 0], &self.limits);
+                scene.output = self.output;
+                self.fill(&mut scene, Amount::OnDevice(&positions))?;
+                plans.push(frame::plan(&scene)?);
+            }
+        }
+        let recipes: Vec<_> = plans.iter().flat_map(Plan::recipes).collect();
+        self.pipelines.make(&self.host, unique(recipes))
+    }
+
+    /// Puts particles into a scene.
+    fn fill(&self, scene: &mut Scene, amount: Amount) -> Result<(), Error> {
+        match amount {
+            Amount::Prepared { splash, body } => {
+                (scene.count, scene.splash, scene.body) = ((splash + body) as u32, splash > 0, body > 0);
+            }
+            Amount::OnDevice(p) => {
+                scene.count = p.count;
+                // Only the device will know whether there are particles of each class.
+                (scene.splash, scene.body) = (p.count > 0, p.count > 0);
+                let constants = p.constants(p.offset % BINDING_ALIGNMENT)?;
+                let keep_classes = p.keep_class_below.is_some();
+                let made = Preparation { constants, entries: p.entries(), keep_classes, neighbours: 0 };
+                scene.prepare = (p.count > 0).then_some(made);
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses particles on the device whose buffers it cannot bind.
+    fn check_bindings(&self, plan: &Plan, p: &DevicePositions) -> Result<(), Error> {
+        let largest = self.limits.storage_size;
+        let asked = BINDING_ALIGNMENT + p.stride * u64::from(p.count);
+        let buffers = plan.resources.iter().filter_map(|r| match r.made {
+            Made::Own(Spec::Buffer { bytes, .. }) => Some((r.name, bytes)),
+            _ => None,
+        });
+        for (name, bytes) in buffers.chain([("positions (host's)", asked)]) {
+            if bytes > largest || p.entries() > u64::from(u32::MAX) {
+                let remedy = format!("{name} would take {bytes} bytes; this device binds {largest} at most");
+                return Err(Error::parameter("particles", p.count, remedy));
+            }
+        }
+        Ok(())
     }
 
     /// Keeps something that recorded commands may still use until the next frame has completed: uploads and copies
@@ -213,21 +279,21 @@ impl Renderer {
         };
         let mut bounds = self.scene.bounds;
         let mut space = self.scene.space;
-        let mut prepare = None;
         let mut positions = (vk::Buffer::null(), 0, 0);
-        let needs = if let Some(p) = &input.positions {
-            let begin = p.offset % BINDING_ALIGNMENT;
-            let constants = p.constants(begin)?;
+        let mut scene = Scene::new(input.settings, self.size, [self.scene.splash, self.scene.body], &self.limits);
+        (scene.output, scene.background, scene.environment) = (self.output, input.background, environment.shape);
+        scene.has_scene = input.scene.is_some();
+        if let Some(p) = &input.positions {
+            self.fill(&mut scene, Amount::OnDevice(p))?;
             // The device finds the box; what is written here never shows.
             (bounds, space) = ((Vec3::ZERO, Vec3::ZERO), Space::new(p.radius, Vec3::ZERO));
             if p.count > 0 {
+                let begin = p.offset % BINDING_ALIGNMENT;
                 positions = (p.buffer, p.offset - begin, begin + p.stride * u64::from(p.count - 1) + 12);
-                prepare = Some(constants);
             }
-            self.needs_on_device(input.settings, p, input.debug, input.neighbours)?
-        } else {
-            self.needs(input.settings, input.debug)
-        };
+        }
+        #[cfg(feature = "inspect")]
+        self.inspection.apply(&mut scene);
         let mut block = input.camera.uniforms(input.settings, self.size, &space, bounds);
         if let Some(p) = &input.positions {
             // In the preparation's units; the extent pass moves the origin and goes on to radii.
@@ -240,65 +306,69 @@ impl Renderer {
             let remedy = format!("the eye is more than {FARTHEST_EYE:e} particle radii away: go nearer");
             return Err(Error::parameter("camera view", input.camera.view, remedy));
         }
-        let Some(slot) = self.slots.get_mut(input.slot) else {
+        if input.slot >= self.slots.len() {
             return Err(Error::parameter("slot", input.slot, "use less than Host::frames_in_flight"));
-        };
-        check_memory(&self.host, &self.limits, &self.table, &needs)?;
+        }
+        let keeps_classes = scene.prepare.is_some_and(|p| p.keep_classes);
+        if let Some(p) = &mut scene.prepare {
+            // The buffer that the last frame left is still the one, if it is as large as this frame's.
+            let old = self.tables[0].get(LAST_CLASSES).map(|e| e.spec);
+            let same = matches!(old, Some(Spec::Buffer { bytes, .. }) if bytes == 4 * u64::from(scene.count));
+            p.constants.options.z = u32::from(keeps_classes && same && self.last_classes);
+        }
+        let plan = frame::plan(&scene)?;
+        if let Some(p) = &input.positions {
+            self.check_bindings(&plan, p)?;
+        }
+        check_memory(&self.host, &self.limits, &self.tables, &plan)?;
+        self.pipelines.make(&self.host, plan.recipes())?;
+
+        let slot = &mut self.slots[input.slot];
         // The slot's last frame has completed, and with it every frame before.
         self.retired.collect(&self.host, slot.frame);
+        slot.fit(&self.host, &plan)?;
         self.frame += 1;
-        self.table.fit(&self.host, &needs, &mut self.retired, self.frame)?;
-        self.table.discard_contents();
-        let classes = match self.table.get(Id::LastClasses) {
-            Some(Resource::Buffer(b)) => Some(b.handle),
-            _ => None,
-        };
-        if let Some(p) = &mut prepare {
-            p.options.z = u32::from(classes.is_some() && classes == self.last_classes);
+        for (table, home) in self.tables.iter_mut().zip(HOMES) {
+            table.fit(&self.host, &plan, home, &mut self.retired, self.frame)?;
+            table.discard_contents();
         }
-        self.last_classes = classes;
+        self.last_classes = keeps_classes;
 
-        block.particles.x = needs.count;
+        block.particles.x = scene.count;
         block.particles.z = self.limits.point_size as u32;
-        block.particles.w = u32::from(input.settings.quads_only || self.limits.point_size <= 1.0);
+        block.particles.w = u32::from(input.settings.drawing.quads_only || !scene.points);
         block.scene.w = f32::from(input.eye_inside);
-        let externals = Externals {
-            frame_block: slot.frame_block.handle,
-            positions,
-            particles: self
-                .particles
-                .as_ref()
-                .map_or([vk::Buffer::null(); 3], |b| [&b[0], &b[1], &b[2]].map(|b| b.handle)),
-            environment: (environment.view, environment.layout),
-            environment_shape: environment.shape,
-            scene: input.scene,
-            background: input.background,
-            output: input.output,
-        };
         if let Some(scene) = &input.scene {
             let p = &input.camera.projection;
             block.scene = Vec4::new(p.z_axis.z, p.w_axis.z / space.radius as f32, scene.cleared_depth, block.scene.w);
         }
+        let particles = self.particles.as_ref();
+        let externals = Externals {
+            frame_block: slot.frame_block.handle,
+            positions,
+            particles: particles.map_or([vk::Buffer::null(); 3], |b| b.each_ref().map(|b| b.handle)),
+            environment: (environment.view, environment.layout),
+            scene: input.scene,
+            output: input.output,
+        };
         slot.frame_block.mapped()[..size_of_val(&block)].copy_from_slice(bytemuck::bytes_of(&block));
-        // SAFETY: no set of this slot is in use (contract).
-        unsafe { self.host.device.reset_descriptor_pool(slot.pool, vk::DescriptorPoolResetFlags::empty()) }
-            .map_err(Error::vulkan("descriptor pool"))?;
         if let Some(p) = &mut slot.profiler {
             p.begin_frame(&self.host.device, cmd);
         }
-        self.plan.clear();
-        let mut recorder = Recorder {
+        self.barriers.clear();
+        let recorder = Recorder {
             host: &self.host,
             cmd,
-            table: &mut self.table,
+            plan: &plan,
+            pipelines: &self.pipelines,
+            tables: self.tables.each_mut(),
             externals,
             pool: slot.pool,
             profiler: slot.profiler.as_mut(),
-            plan: &mut self.plan,
-            size: self.size,
+            barriers: &mut self.barriers,
             frame_block: access::State::default(),
         };
-        let recorded = frame::record(&mut recorder, &mut self.passes, &needs, input.settings, prepare.as_ref());
+        let recorded = recorder.record();
         match &recorded {
             Ok(()) => slot.frame = self.frame,
             Err(_) => self.abandon(input.slot),
@@ -310,8 +380,10 @@ impl Renderer {
     /// To be called before the next frame is recorded into any slot, for each such frame, in any order. Waits for nothing.
     pub fn abandon(&mut self, slot: usize) {
         // Its barriers never run either: start again from new resources. Classes of an earlier frame are not kept.
-        self.table.retire_all(&mut self.retired, self.frame + 1);
-        self.last_classes = None;
+        for table in &mut self.tables {
+            table.retire_all(&mut self.retired, self.frame + 1);
+        }
+        self.last_classes = false;
         if let Some(slot) = self.slots.get_mut(slot) {
             // That this slot is free again says nothing of frames before this one, which may still run.
             slot.frame = 0;
@@ -323,7 +395,7 @@ impl Renderer {
 
     /// The barriers of the last recorded frame, in order; printable.
     pub fn plan(&self) -> &[PlanEntry] {
-        &self.plan
+        &self.barriers
     }
 
     /// GPU times of the frame last recorded into a slot, which has completed; `None` before the first, or without
@@ -332,100 +404,44 @@ impl Renderer {
         self.slots.get(slot)?.profiler.as_ref()?.read(&self.host.device)
     }
 
-    /// How a resource of the last frame was made; `None` if that frame did without it.
-    pub fn spec(&self, id: Id) -> Option<Spec> {
-        self.table.spec(id)
-    }
-
-    /// Records a copy of one layer of a target (tightly packed rows) or of a whole buffer, as the last frame left it.
-    ///
-    /// # Safety
-    /// `cmd` is recording, outside rendering, and runs after the frame; `to` holds the content from `offset` on, was
-    /// made with `TRANSFER_DST`, and is made visible to the host by the caller.
-    pub unsafe fn record_copy(
-        &mut self,
-        cmd: vk::CommandBuffer,
-        id: Id,
-        layer: u32,
-        to: vk::Buffer,
-        offset: u64,
-    ) -> Result<(), Error> {
-        if self.table.get(id).is_none() {
-            return Err(Error::parameter("target", id.name(), "the last frame did without it"));
-        }
-        let mut recorder = Recorder {
-            host: &self.host,
-            cmd,
-            table: &mut self.table,
-            externals: Externals {
-                frame_block: vk::Buffer::null(),
-                positions: Default::default(),
-                particles: [vk::Buffer::null(); 3],
-                environment: Default::default(),
-                environment_shape: EnvironmentShape::default(),
-                scene: None,
-                background: Background::default(),
-                output: vk::ImageView::null(),
-            },
-            pool: vk::DescriptorPool::null(),
-            profiler: None,
-            plan: &mut self.plan,
-            size: self.size,
-            frame_block: access::State::default(),
-        };
-        recorder.barriers("copy", &[used(id, access::Access::TransferRead)]);
-        match (self.table.get(id), self.table.spec(id)) {
-            (Some(Resource::Image(image)), Some(Spec::Image(spec))) => {
-                let layers = vk::ImageSubresourceLayers {
-                    aspect_mask: image.aspect,
-                    mip_level: 0,
-                    base_array_layer: layer,
-                    layer_count: 1,
-                };
-                let extent = vk::Extent3D { width: spec.size[0], height: spec.size[1], depth: 1 };
-                let copy =
-                    vk::BufferImageCopy::default().buffer_offset(offset).image_subresource(layers).image_extent(extent);
-                let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-                // SAFETY: the image was just brought into this layout; the rest is this function's contract.
-                unsafe { self.host.device.cmd_copy_image_to_buffer(cmd, image.handle, layout, to, &[copy]) };
-            }
-            (Some(Resource::Buffer(buffer)), Some(Spec::Buffer { bytes, .. })) => {
-                let copy = vk::BufferCopy { src_offset: 0, dst_offset: offset, size: bytes };
-                // SAFETY: as above.
-                unsafe { self.host.device.cmd_copy_buffer(cmd, buffer.handle, to, &[copy]) };
-            }
-            _ => {}
-        }
-        Ok(())
-    }
-
     /// Destroys everything the renderer made.
     ///
     /// # Safety
     /// No frame recorded by this renderer is in flight.
     pub unsafe fn destroy(mut self) {
-        self.table.retire_all(&mut self.retired, 0);
+        for table in &mut self.tables {
+            table.retire_all(&mut self.retired, 0);
+        }
         self.retired.collect(&self.host, u64::MAX);
         self.particles.take().into_iter().flatten().for_each(|mut b| b.destroy(&self.host));
         if let Some(mut i) = self.environment.take() {
             i.destroy(&self.host);
         }
         self.slots.drain(..).for_each(|mut slot| slot.destroy(&self.host));
-        self.passes.destroy(&self.host);
+        self.pipelines.destroy(&self.host);
     }
 }
 
 /// Refuses a frame that does not fit the device, before anything is made for it.
-fn check_memory(host: &Host, limits: &Limits, table: &Table, needs: &Needs) -> Result<(), Error> {
-    if table.fits(needs) {
+fn check_memory(host: &Host, limits: &Limits, tables: &[Table; 2], plan: &Plan) -> Result<(), Error> {
+    if tables.iter().zip(HOMES).all(|(table, home)| table.fits(plan, home)) {
         return Ok(());
     }
-    let needed: u64 = targets::ledger(&host.device, needs).iter().map(|e| e.bytes).sum();
+    let needed: u64 = table::ledger(&host.device, plan).iter().map(|e| e.bytes).sum();
     match needed.checked_sub(limits.memory) {
         None | Some(0) => Ok(()),
         Some(missing) => Err(Error::MemoryShort { needed, available: limits.memory, missing }),
     }
 }
+
+/// Each once.
+fn unique<'a>(recipes: Vec<&'a Recipe>) -> Vec<&'a Recipe> {
+    let mut seen = HashSet::new();
+    recipes.into_iter().filter(|r| seen.insert(*r)).collect()
+}
+
+/// In the order of the tables.
+const HOMES: [Home; 2] = [Home::Particles, Home::View];
 
 /// Slots are made ahead, each with buffers and pools of its own.
 const MOST_SLOTS: u32 = 256;

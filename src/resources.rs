@@ -216,6 +216,20 @@ impl Resource {
     }
 }
 
+/// An image or a buffer, as it has to be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spec {
+    /// An image.
+    Image(ImageSpec),
+    /// A buffer of so many bytes in device memory.
+    Buffer {
+        /// Size.
+        bytes: u64,
+        /// Usage.
+        usage: vk::BufferUsageFlags,
+    },
+}
+
 /// Replaced resources, each with the number of the last frame that may use it.
 #[derive(Default)]
 pub(crate) struct Retired(Vec<(u64, Resource)>);

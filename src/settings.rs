@@ -1,106 +1,80 @@
-//! What a frame is asked for: camera, smoothing and optics.
+//! What a frame is asked for: method, liquid, drawing; and the camera.
 
-use crate::{Error, shader::Frame, space::Space};
+use crate::{
+    Error, Method,
+    parameters::{Parameter, Parameters, parameters},
+    shader::Frame,
+    space::Space,
+};
 use glam::{Mat3, Mat4, UVec4, Vec3, Vec4};
 
-/// Reflectance of the water surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum Fresnel {
-    /// Schlick's approximation (Imai16).
-    #[default]
-    Schlick,
-    /// Exact, for unpolarised light between dielectrics.
-    Exact,
+parameters! {
+    /// The liquid itself.
+    pub struct Liquid {
+        /// Index of refraction against air
+        ior: f32 = 1.333, "", "a value above 1, up to 4" => |n| *n > 1.0 && *n <= 4.0;
+        /// Absorption of red, green and blue light (Imai16 eq. 9: a·c_a)
+        absorption: Vec3 = Vec3::ZERO, "1 / world unit", "three finite values of at least 0"
+            => |a| a.is_finite() && a.min_element() >= 0.0;
+    }
 }
 
-/// Weights of plane fitting (Imai16 fig. 5).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum Weighting {
-    /// Difference of depths, eq. (2): keeps depth gaps.
-    #[default]
-    ViewDependent,
-    /// Distance of eye-space points: smooths across gaps; the paper's rejected alternative.
-    Euclidean,
+parameters! {
+    /// How particles are drawn. Changes no pixel.
+    pub struct Drawing {
+        /// Drop particles of the body that others hide
+        occlusion_culling: bool = true, "", "true or false" => |_| true;
+        /// Draw quads even where point sprites would do
+        quads_only: bool = false, "", "true or false" => |_| true;
+    }
 }
 
-/// Smoothing and optics of a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a frame is asked for, beside its camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[non_exhaustive]
 pub struct Settings {
-    /// Surfaces at which light bends: 1 (fronts only; no back maps are made), 2 or 4.
-    pub refractions: u32,
-    /// Total internal reflections followed in one walk, 0 to 64.
-    pub internal_reflections: u32,
-    /// Reflectance.
-    pub fresnel: Fresnel,
-    /// Index of refraction of the liquid against air, above 1 and at most 4.
-    pub ior: f32,
-    /// Absorption per world unit for red, green and blue, at least 0 (eq. 9: a·c_a).
-    pub absorption: Vec3,
-    /// Edge of the plane-fitting window in pixels: odd, 3 to [`Settings::MAX_WINDOW`].
-    pub window: u32,
-    /// Iterations of plane fitting, 0 to 20; 0 leaves the body as ray-cast.
-    pub iterations: u32,
-    /// σ of eq. (2) in particle radii, above 0 (Imai16: 5.3).
-    pub sigma: f32,
-    /// Weights of plane fitting.
-    pub weighting: Weighting,
-    /// Drop particles of the body that others hide. Changes no pixel.
-    pub occlusion_culling: bool,
-    /// Draw quads even where point sprites would do. Changes no pixel.
-    pub quads_only: bool,
+    /// Layers, smoothing, optics.
+    pub method: Method,
+    /// The liquid itself.
+    pub liquid: Liquid,
+    /// How particles are drawn.
+    pub drawing: Drawing,
 }
 
-impl Default for Settings {
-    fn default() -> Self {
-        Settings {
-            refractions: 4,
-            internal_reflections: 4,
-            fresnel: Fresnel::Schlick,
-            ior: 1.333,
-            absorption: Vec3::ZERO,
-            window: 9,
-            iterations: 2,
-            sigma: 5.3,
-            weighting: Weighting::ViewDependent,
-            occlusion_culling: true,
-            quads_only: false,
-        }
+impl From<Method> for Settings {
+    /// With the liquid and the drawing of the defaults.
+    fn from(method: Method) -> Settings {
+        Settings { method, ..Settings::default() }
     }
 }
 
 impl Settings {
-    /// Largest window: its tile of normals and depths fills the 16 KiB of shared memory that Vulkan guarantees.
-    pub const MAX_WINDOW: u32 = 25;
+    fn groups(&self) -> [&dyn Parameters; 5] {
+        let m = &self.method;
+        [m.layers.parameters(), m.smooth.parameters(), m.optics.parameters(), &self.liquid, &self.drawing]
+    }
 
-    /// Checks every range.
+    /// Every parameter that these settings have.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        self.groups().iter().flat_map(|g| g.parameters()).collect()
+    }
+
+    /// Sets a parameter of whichever part has it, from text; [`Settings::validate`] checks ranges.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<(), Error> {
+        for group in [&mut self.liquid as &mut dyn Parameters, &mut self.drawing] {
+            if group.parameters().iter().any(|p| p.name == name) {
+                return group.set(name, text);
+            }
+        }
+        self.method.set(name, text)
+    }
+
+    /// Checks every range, and that the members of the method go together.
     pub fn validate(&self) -> Result<(), Error> {
-        let check = |ok: bool, name, value: String, remedy: &str| {
-            if ok { Ok(()) } else { Err(Error::parameter(name, value, remedy)) }
-        };
-        check(matches!(self.refractions, 1 | 2 | 4), "refractions", self.refractions.to_string(), "use 1, 2 or 4")?;
-        check(
-            self.internal_reflections <= 64,
-            "internal reflections",
-            self.internal_reflections.to_string(),
-            "use 0 to 64",
-        )?;
-        check(
-            self.ior > 1.0 && self.ior <= 4.0,
-            "index of refraction",
-            self.ior.to_string(),
-            "use a value above 1, up to 4",
-        )?;
-        let absorbs = self.absorption.is_finite() && self.absorption.min_element() >= 0.0;
-        check(absorbs, "absorption", self.absorption.to_string(), "use three finite values of at least 0")?;
-        let odd = self.window % 2 == 1 && (3..=Self::MAX_WINDOW).contains(&self.window);
-        check(odd, "window", self.window.to_string(), "use an odd number of pixels from 3 to 25")?;
-        check(self.iterations <= 20, "iterations", self.iterations.to_string(), "use 0 to 20")?;
-        check(
-            self.sigma.is_finite() && self.sigma > 0.0,
-            "sigma",
-            self.sigma.to_string(),
-            "use a finite value above 0, in particle radii",
-        )
+        self.method.validate()?;
+        self.liquid.validate()?;
+        self.drawing.validate()
     }
 }
 
@@ -199,14 +173,9 @@ impl Camera {
             eye_to_env: Mat4::from_mat3(to_up * Mat3::from_mat4(self.view).transpose()),
             to_pixel,
             viewport: Vec4::new(w, h, self.near / radius, 0.0),
-            smoothing: Vec4::new(
-                settings.sigma,
-                crate::shader::FIT_UPDATE_LIMIT * settings.sigma,
-                crate::shader::FIT_GRAZING_LIMIT,
-                0.0,
-            ),
-            search: Vec4::new(converged, accepted, jump, settings.ior),
-            absorption: (settings.absorption * radius).min(Vec3::MAX).extend(0.0), // infinite times nothing is no number
+            smoothing: smoothing(settings),
+            search: Vec4::new(converged, accepted, jump, settings.liquid.ior),
+            absorption: (settings.liquid.absorption * radius).min(Vec3::MAX).extend(0.0), // infinite times nothing is no number
             bounds_min: low.extend(0.0),
             bounds_max: high.extend(0.0),
             scene: Vec4::ZERO,
@@ -222,4 +191,13 @@ impl Camera {
     pub const JUMP: f32 = crate::shader::JUMP;
     /// in what a pixel covers in the middle of the liquid, whichever is more: a surface 80 degrees steep.
     pub const JUMP_PIXELS: f32 = crate::shader::STEEP;
+}
+
+/// What plane fitting reads of the block.
+fn smoothing(settings: &Settings) -> Vec4 {
+    let sigma = match &settings.method.smooth {
+        crate::smooth::Smooth::PlaneFit(p) => p.sigma,
+        _ => 1.0,
+    };
+    Vec4::new(sigma, crate::shader::FIT_UPDATE_LIMIT * sigma, crate::shader::FIT_GRAZING_LIMIT, 0.0)
 }

@@ -1,15 +1,21 @@
 //! Shaders as build.rs made them, and the block layouts they share with the host (generated from
 //! `glsl/include/shared.glsl`).
 
-/// A compiled shader and the bindings it has in descriptor set 0, reflected from its SPIR-V.
+/// A compiled shader and what it asks of its pipeline, reflected from its SPIR-V.
 #[derive(Debug)]
 pub struct Shader {
-    /// Source file in `glsl/`.
+    /// Source file in `glsl/`, and the macros it was compiled with.
     pub name: &'static str,
     /// SPIR-V words.
     pub spirv: &'static [u32],
     /// Bindings of set 0, by index.
     pub bindings: &'static [Binding],
+    /// Id and name of each specialisation constant, four bytes all.
+    pub constants: &'static [(u32, &'static str)],
+    /// Name and byte offset of each member of the push-constant block.
+    pub push: &'static [(&'static str, u32)],
+    /// Bytes of that block.
+    pub push_bytes: u32,
 }
 
 /// One binding of a shader.
@@ -24,27 +30,38 @@ pub struct Binding {
 }
 
 /// Kinds of descriptors that passes use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// `texture…` without a sampler.
-    SampledImage,
+    SampledImage(Texels),
     /// `image…`.
-    StorageImage,
-    /// `uniform … {}`.
-    UniformBuffer,
+    StorageImage(Texels),
+    /// `uniform … {}` of so many bytes.
+    UniformBuffer(u32),
     /// `buffer … {}`.
     StorageBuffer,
     /// `sampler`, always the same: nearest, clamped.
     Sampler,
 }
 
+/// What an image holds and how it is addressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Texels {
+    /// Unsigned integers, not floats.
+    pub uint: bool,
+    /// Has layers.
+    pub array: bool,
+    /// A cube map.
+    pub cube: bool,
+}
+
 impl Kind {
     pub(crate) fn descriptor_type(self) -> ash::vk::DescriptorType {
         use ash::vk::DescriptorType as T;
         match self {
-            Kind::SampledImage => T::SAMPLED_IMAGE,
-            Kind::StorageImage => T::STORAGE_IMAGE,
-            Kind::UniformBuffer => T::UNIFORM_BUFFER,
+            Kind::SampledImage(_) => T::SAMPLED_IMAGE,
+            Kind::StorageImage(_) => T::STORAGE_IMAGE,
+            Kind::UniformBuffer(_) => T::UNIFORM_BUFFER,
             Kind::StorageBuffer => T::STORAGE_BUFFER,
             Kind::Sampler => T::SAMPLER,
         }
@@ -54,7 +71,22 @@ impl Kind {
 /// Generated code; the constants are documented where they are written, in `glsl/include/shared.glsl`.
 #[allow(missing_docs, clippy::unreadable_literal, clippy::excessive_precision)]
 mod generated {
-    use super::{Binding, Kind, Shader};
+    use super::{Binding, Kind, Shader, Texels};
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 }
 pub use generated::*;
+
+// By address: every shader is one static.
+impl PartialEq for Shader {
+    fn eq(&self, other: &Shader) -> bool {
+        std::ptr::eq(self, other)
+    }
+}
+
+impl Eq for Shader {}
+
+impl std::hash::Hash for Shader {
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        std::ptr::from_ref(self).hash(state);
+    }
+}

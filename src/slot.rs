@@ -1,6 +1,6 @@
 //! What belongs to one of the frames in flight.
 
-use crate::{Error, device::Host, profile::Profiler, resources::Buffer, shader, targets::Id};
+use crate::{Error, device::Host, plan::Plan, profile::Profiler, resources::Buffer, shader};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
@@ -8,51 +8,57 @@ use gpu_allocator::MemoryLocation;
 pub(crate) struct Slot {
     pub profiler: Option<Profiler>,
     pub pool: vk::DescriptorPool,
+    /// Sets, and descriptors of each type, that the pool holds.
+    room: (u32, Vec<(vk::DescriptorType, u32)>),
     pub frame_block: Buffer,
     /// Number of the frame last recorded into this slot; 0: none yet.
     pub frame: u64,
 }
 
-/// Descriptor sets of one frame: 20 iterations of smoothing, 60 steps of the sort and two dozen others.
-const SETS: u32 = 128;
-
 impl Slot {
     pub fn new(host: &Host) -> Result<Slot, Error> {
-        let size = |ty, count| vk::DescriptorPoolSize { ty, descriptor_count: count * SETS };
-        let sizes = [
-            size(vk::DescriptorType::UNIFORM_BUFFER, 1),
-            size(vk::DescriptorType::STORAGE_BUFFER, 8),
-            size(vk::DescriptorType::SAMPLED_IMAGE, 8),
-            size(vk::DescriptorType::STORAGE_IMAGE, 1),
-            size(vk::DescriptorType::SAMPLER, 1),
-        ];
         // The extent pass completes it where positions are prepared on the device.
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
-        let mut frame_block = Buffer::new(
-            host,
-            Id::FrameBlock.name(),
-            size_of::<shader::Frame>() as u64,
-            usage,
-            MemoryLocation::CpuToGpu,
-        )?;
-        let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(&sizes);
-        // SAFETY: complete info on a live device.
-        let pool = match unsafe { host.device.create_descriptor_pool(&info, None) } {
-            Ok(pool) => pool,
-            Err(e) => {
-                frame_block.destroy(host);
-                return Err(Error::vulkan("descriptor pool")(e));
-            }
-        };
-        match Profiler::new(host) {
-            Ok(profiler) => Ok(Slot { profiler, pool, frame_block, frame: 0 }),
-            Err(e) => {
-                frame_block.destroy(host);
-                // SAFETY: just made, never used.
-                unsafe { host.device.destroy_descriptor_pool(pool, None) };
-                Err(e)
+        let bytes = size_of::<shader::Frame>() as u64;
+        let frame_block = Buffer::new(host, "frame block", bytes, usage, MemoryLocation::CpuToGpu)?;
+        let pool = vk::DescriptorPool::null();
+        Ok(Slot { profiler: Profiler::new(host), pool, room: (0, Vec::new()), frame_block, frame: 0 })
+    }
+
+    /// Makes room for a plan's descriptor sets and timestamps; the slot's last frame has completed.
+    pub fn fit(&mut self, host: &Host, plan: &Plan) -> Result<(), Error> {
+        if let Some(p) = &mut self.profiler {
+            p.fit(host, plan.scopes())?;
+        }
+        let (sets, mut counts) = plan.descriptors();
+        if sets == 0 {
+            return Ok(());
+        }
+        let had = |ty| self.room.1.iter().find(|(t, _)| *t == ty).map_or(0, |(_, n)| *n);
+        if sets <= self.room.0 && counts.iter().all(|(ty, count)| *count <= had(*ty)) {
+            // SAFETY: no set of this slot is in use any more.
+            return unsafe { host.device.reset_descriptor_pool(self.pool, vk::DescriptorPoolResetFlags::empty()) }
+                .map_err(Error::vulkan("descriptor pool"));
+        }
+        // As much as before at least: plans that take turns find room.
+        let sets = sets.max(self.room.0);
+        for (ty, had) in &self.room.1 {
+            match counts.iter_mut().find(|(t, _)| t == ty) {
+                Some((_, count)) => *count = (*count).max(*had),
+                None => counts.push((*ty, *had)),
             }
         }
+        let sizes: Vec<_> =
+            counts.iter().map(|(ty, count)| vk::DescriptorPoolSize { ty: *ty, descriptor_count: *count }).collect();
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets).pool_sizes(&sizes);
+        // SAFETY: complete info on a live device; no set of the old pool is in use any more.
+        unsafe {
+            let pool = host.device.create_descriptor_pool(&info, None).map_err(Error::vulkan("descriptor pool"))?;
+            host.device.destroy_descriptor_pool(self.pool, None);
+            self.pool = pool;
+        }
+        self.room = (sets, counts);
+        Ok(())
     }
 
     /// Destroys it; its last frame has completed.

@@ -359,6 +359,7 @@ impl<'a> Gpu<'a> {
             physical_device: self.info.handle,
             queue_family: self.info.family,
             allocator: self.allocator.clone().expect("made in new"),
+            pipeline_cache: vk::PipelineCache::null(),
             frames_in_flight,
             large_points: self.info.large_points,
             debug_utils: self.debug.clone(),

@@ -3,8 +3,8 @@
 use super::{Canvas, Gpu, HostError};
 use crate::{
     Equirect, FrameInput, Renderer,
+    inspect::Spec,
     profile::FrameTimes,
-    targets::{Id, Spec},
 };
 use ash::vk;
 
@@ -66,8 +66,8 @@ impl<'a> Session<'a> {
     }
 
     /// The words of one layer of a target, or of a buffer; `None` if the last frame did without it.
-    pub fn words(&mut self, id: Id, layer: u32) -> Result<Option<Vec<u32>>, HostError> {
-        let bytes = match self.renderer.spec(id) {
+    pub fn words(&mut self, name: &'static str, layer: u32) -> Result<Option<Vec<u32>>, HostError> {
+        let bytes = match self.renderer.spec(name) {
             None => return Ok(None),
             Some(Spec::Image(spec))
                 if layer >= spec.layers || !spec.usage.contains(vk::ImageUsageFlags::TRANSFER_SRC) =>
@@ -82,7 +82,7 @@ impl<'a> Session<'a> {
         };
         let renderer = &mut self.renderer;
         // SAFETY: recorded outside rendering after the frame; the buffer has room for the whole layer.
-        let data = self.gpu.read_back(bytes, |cmd, to| Ok(unsafe { renderer.record_copy(cmd, id, layer, to, 0) }?))?;
+        let data = self.gpu.read_back(bytes, |cmd, to| Ok(unsafe { renderer.record_copy(cmd, name, layer, to, 0) }?))?;
         Ok(Some(data.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect()))
     }
 

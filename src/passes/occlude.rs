@@ -1,31 +1,20 @@
 //! How deep the body certainly reaches at each pixel (`glsl/occlude.comp`): what [`super::cull`] tests against.
 
-use super::{Pipelines, particles, per_particle};
+use super::{Arrays, per_particle};
 use crate::{
-    Error,
-    access::Access,
-    pipeline::Pipeline,
-    recorder::{Recorder, bound},
+    frame::Scene,
+    plan::{Call, Plan, Target},
     shader::OCCLUDE_COMP,
-    targets::{Id, Needs},
 };
 
-#[derive(Default)]
-pub(crate) struct Occlude {
-    pub pipelines: Pipelines<()>,
-}
-
-impl Occlude {
-    pub fn record(&mut self, r: &mut Recorder, needs: &Needs) -> Result<(), Error> {
-        let host = r.host;
-        let [centers, diagonals, mixed] = particles(Access::ComputeRead);
-        let uses = [centers, diagonals, mixed, bound(4, Id::Bounds, Access::ComputeReadWrite)];
-        let pipeline = self.pipelines.get((), |()| Pipeline::compute(host, &OCCLUDE_COMP, &[], 0))?;
-        r.pass("occlude", &uses, |r| {
-            r.bind(pipeline, &uses)?;
-            let [x, y] = per_particle(needs);
-            r.dispatch(x, y, 1);
-            Ok(())
-        })
-    }
+/// Two 32-bit bounds a pixel: nearest front, then farthest back.
+pub(crate) fn record(plan: &mut Plan, scene: &Scene, particles: &Arrays) -> Target {
+    let half = 4 * u64::from(plan.size[0]) * u64::from(plan.size[1]);
+    let bounds = plan.buffer("body depth bounds", 2 * half);
+    // No front is certain: infinitely far. No back: at the eye.
+    plan.fill("occlude", bounds, 0, half, f32::INFINITY.to_bits());
+    plan.fill("occlude", bounds, half, half, 0);
+    let call = particles.read_by(Call::compute(&OCCLUDE_COMP)).update("bounds", bounds);
+    plan.dispatch("occlude", call, per_particle(scene.count));
+    bounds
 }

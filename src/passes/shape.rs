@@ -1,57 +1,49 @@
 //! Number density, class and ellipsoid of each particle (`glsl/shape.comp`; Imai16 §4.1, YuTurk13).
 
-use super::{Pipelines, groups, rectangle};
+use super::{Arrays, counters, rectangle, sort::Sorted};
 use crate::{
-    Error,
-    access::Access,
-    pipeline::Pipeline,
-    recorder::{Recorder, bound},
-    shader::{PARTICLE_GROUP, Prepare, SHAPE_COMP, SHAPE_NEIGHBOURS_COMP, SHAPE_RUN},
-    targets::{Id, Needs},
+    frame::{Preparation, Scene},
+    plan::{Call, Plan, Target},
+    shader::{PARTICLE_GROUP, SHAPE_COMP, SHAPE_RUN},
 };
 
-#[derive(Default)]
-pub(crate) struct Shape {
-    /// By (relation table, classes kept, neighbours listed).
-    pub pipelines: Pipelines<[bool; 3]>,
-}
+/// The array that keeps classes from frame to frame.
+pub(crate) const LAST_CLASSES: &str = "last classes";
 
-impl Shape {
-    pub fn record(&mut self, r: &mut Recorder, needs: &Needs, prepare: &Prepare) -> Result<(), Error> {
-        let kept = needs.spec(Id::LastClasses).is_some();
-        let listed = needs.spec(Id::Neighbours).is_some();
-        let mut uses = vec![
-            bound(1, Id::Positions, Access::ComputeRead),
-            bound(2, Id::Extent, Access::ComputeRead),
-            bound(3, Id::Order, Access::ComputeRead),
-            bound(4, Id::Sorted, Access::ComputeRead),
-            bound(5, Id::Centers, Access::ComputeWrite),
-            bound(6, Id::Diagonals, Access::ComputeWrite),
-            bound(7, Id::Mixed, Access::ComputeWrite),
-            bound(8, Id::Counters, Access::ComputeReadWrite),
-            // Where no classes are kept the shader does not look, but something has to be bound.
-            if kept {
-                bound(9, Id::LastClasses, Access::ComputeReadWrite)
-            } else {
-                bound(9, Id::Counters, Access::ComputeReadWrite)
-            },
-        ];
-        if listed {
-            uses.push(bound(10, Id::Neighbours, Access::ComputeWrite));
-        }
-        let host = r.host;
-        let key = [prepare.source.w != 1, kept, listed];
-        let pipeline = self.pipelines.get(key, |[relation, kept, listed]| {
-            let shader = if *listed { &SHAPE_NEIGHBOURS_COMP } else { &SHAPE_COMP };
-            let constants = [u32::from(*relation), u32::from(*kept)];
-            Pipeline::compute(host, shader, &constants, size_of::<Prepare>() as u32)
-        })?;
-        r.pass("shape", &uses, |r| {
-            r.bind(pipeline, &uses)?;
-            r.push(pipeline, prepare);
-            let [x, y] = rectangle(groups(needs.count, SHAPE_RUN * PARTICLE_GROUP));
-            r.dispatch(x, y, 1);
-            Ok(())
-        })
+pub(crate) fn record(
+    plan: &mut Plan,
+    scene: &Scene,
+    preparation: &Preparation,
+    extent: Target,
+    sorted: &Sorted,
+) -> Arrays {
+    let count = u64::from(scene.count);
+    let mut array = |name| plan.array(name, 12 * count);
+    let arrays = Arrays {
+        centers: array("particle centres"),
+        diagonals: array("particle shapes (diagonal)"),
+        mixed: array("particle shapes (mixed)"),
+    };
+    let counters = counters(plan);
+    // Where no classes are kept the shader does not look, but something has to be bound.
+    let classes = if preparation.keep_classes { plan.array(LAST_CLASSES, 4 * count) } else { counters };
+    let listed = preparation.neighbours > 0;
+    let mut call = Call::compute(&SHAPE_COMP[usize::from(listed)])
+        .read("extent", extent)
+        .read("order", sorted.order)
+        .read("sorted", sorted.positions)
+        .write("centers", arrays.centers)
+        .write("diagonals", arrays.diagonals)
+        .write("mixed_parts", arrays.mixed)
+        .update("counters", counters)
+        .update("last_classes", classes)
+        .constant("RELATION", preparation.constants.source.w != 1)
+        .constant("KEEP_CLASSES", preparation.keep_classes)
+        .push_all(&preparation.constants);
+    if listed {
+        let lists = plan.array("neighbours (debug)", 4 * (2 + u64::from(preparation.neighbours)) * count);
+        call = call.write("neighbours", lists);
     }
+    plan.dispatch("shape", call, rectangle(scene.count.div_ceil(SHAPE_RUN * PARTICLE_GROUP)));
+    arrays
 }

@@ -1,50 +1,45 @@
 //! Particles, or entries of the relation table, sorted by cell (`glsl/sort.comp`; Im16 §III).
 
-use super::{Pipelines, bind_step, per_particle};
+use super::{per_particle, sums_bytes};
 use crate::{
-    Error,
-    access::Access,
-    recorder::{Recorder, Use, bound, used},
+    frame::{Preparation, Scene},
+    plan::{Call, External, Groups, Plan, Target},
     shader::{
-        EXTENT_DISPATCH, Prepare, SORT_COUNT_COMP, SORT_GATHER_COMP, SORT_PASSES, SORT_SCAN_COMP, SORT_SCATTER_COMP,
+        DIGITS, EXTENT_DISPATCH, Prepare, SORT_COUNT_COMP, SORT_GATHER_COMP, SORT_PASSES, SORT_SCAN_COMP, SORT_SCATTER_COMP,
+        Shader,
     },
-    targets::{Id, Needs},
 };
 
-#[derive(Default)]
-pub(crate) struct Sort {
-    /// By step, and whether the relation table is sorted.
-    pub pipelines: Pipelines<(usize, bool)>,
+/// The order, and positions in it.
+#[derive(Clone, Copy)]
+pub(crate) struct Sorted {
+    pub order: Target,
+    pub positions: Target,
 }
 
-const USES: [Use; 6] = [
-    bound(1, Id::Positions, Access::ComputeRead),
-    bound(2, Id::Extent, Access::ComputeRead),
-    used(Id::Extent, Access::IndirectRead),
-    bound(3, Id::Order, Access::ComputeReadWrite),
-    bound(4, Id::Sums, Access::ComputeReadWrite),
-    bound(5, Id::Sorted, Access::ComputeWrite),
-];
-
-impl Sort {
-    pub fn record(&mut self, r: &mut Recorder, needs: &Needs, prepare: &Prepare) -> Result<(), Error> {
-        let mut prepare = *prepare;
-        r.pass("sort", &USES, |r| {
-            for pass in 0..SORT_PASSES {
-                prepare.options.y = pass;
-                // How many of these passes the occupied cells need only the device knows: the others are empty.
-                let blocks = 4 * u64::from(EXTENT_DISPATCH + 6 * pass);
-                let steps = [(&SORT_COUNT_COMP, blocks), (&SORT_SCAN_COMP, blocks + 12), (&SORT_SCATTER_COMP, blocks)];
-                for (i, (shader, arguments)) in steps.into_iter().enumerate() {
-                    bind_step(&mut self.pipelines, r, (i, shader), &USES, &prepare)?;
-                    r.dispatch_indirect(Id::Extent, arguments);
-                    r.barriers("sort", &USES);
-                }
-            }
-            bind_step(&mut self.pipelines, r, (3, &SORT_GATHER_COMP), &USES, &prepare)?;
-            let [x, y] = per_particle(needs);
-            r.dispatch(x, y, 1);
-            Ok(())
-        })
+pub(crate) fn record(plan: &mut Plan, scene: &Scene, preparation: &Preparation, extent: Target) -> Sorted {
+    // Indices, read from one half and written to the other.
+    let order = plan.array("sort order", 8 * preparation.entries);
+    let sorted = plan.array("sorted positions", 12 * u64::from(scene.count));
+    let sums = plan.array("digit sums", sums_bytes(preparation.entries, DIGITS));
+    let positions = plan.given(External::Positions);
+    let mut prepare = preparation.constants;
+    let step = |shader: &'static Shader, prepare: &Prepare| {
+        let call = Call::compute(shader).read("positions", positions).read("extent", extent);
+        call.constant("RELATION", preparation.constants.source.w != 1).push_all(prepare)
+    };
+    for pass in 0..SORT_PASSES {
+        prepare.options.y = pass;
+        // How many of these passes the occupied cells need only the device knows: the others are empty.
+        let (blocks, rows) = (4 * u64::from(EXTENT_DISPATCH + 6 * pass), 4 * u64::from(EXTENT_DISPATCH + 6 * pass + 3));
+        let count = step(&SORT_COUNT_COMP, &prepare).read("order", order).update("sums", sums);
+        let scan = step(&SORT_SCAN_COMP, &prepare).update("sums", sums);
+        let scatter = step(&SORT_SCATTER_COMP, &prepare).update("order", order).read("sums", sums);
+        for (call, arguments) in [(count, blocks), (scan, rows), (scatter, blocks)] {
+            plan.dispatch("sort", call, Groups::Indirect(extent, arguments));
+        }
     }
+    let gather = step(&SORT_GATHER_COMP, &prepare).update("order", order).write("sorted", sorted);
+    plan.dispatch("sort", gather, per_particle(scene.count));
+    Sorted { order, positions: sorted }
 }

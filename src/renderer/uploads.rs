@@ -8,7 +8,6 @@ use crate::{
     prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},
     space::{self, Space},
-    targets::Id,
 };
 use ash::vk;
 use glam::Vec3;
@@ -34,10 +33,10 @@ impl Renderer {
             return Err(Error::parameter("particles", count, format!("this device holds {most} at most")));
         }
         let mut made = Vec::with_capacity(3);
-        for id in PARTICLE_ARRAYS {
+        for name in PARTICLE_ARRAYS {
             let bytes = ARRAY_BYTES * count.max(1) as u64;
             let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
-            match Buffer::new(&self.host, id.name(), bytes, usage, MemoryLocation::CpuToGpu) {
+            match Buffer::new(&self.host, name, bytes, usage, MemoryLocation::CpuToGpu) {
                 Ok(buffer) => made.push(buffer),
                 Err(e) => {
                     made.iter_mut().for_each(|b| b.destroy(&self.host));
@@ -100,7 +99,7 @@ impl Renderer {
             array: false,
             usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
         };
-        let image = match Image::new(&self.host, Id::Environment.name(), &spec) {
+        let image = match Image::new(&self.host, "environment", &spec) {
             Ok(image) => image,
             Err(e) => {
                 staging.destroy(&self.host);
@@ -136,7 +135,8 @@ impl Renderer {
 }
 
 /// Three arrays of three floats each hold the particles (glsl/include/particles.glsl).
-pub(super) const PARTICLE_ARRAYS: [Id; 3] = [Id::Centers, Id::Diagonals, Id::Mixed];
+pub(super) const PARTICLE_ARRAYS: [&str; 3] =
+    ["particle centres", "particle shapes (diagonal)", "particle shapes (mixed)"];
 const ARRAY_BYTES: u64 = 12;
 /// Where indices of three floats each, or of a rectangle of work groups, would no longer fit 32 bits.
 const MOST_PARTICLES: u64 = 1 << 30;

@@ -4,7 +4,7 @@
 //! formulas stand as printed, in 64 bits, on eye-space points.
 
 use super::normal::decode_normal;
-use crate::{settings::Weighting, shader::Frame};
+use crate::{shader::Frame, smooth::plane_fit::Weighting};
 use glam::{DVec2, DVec3};
 
 /// What a window's plane is, and eq. (5) makes of it.

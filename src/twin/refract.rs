@@ -7,7 +7,8 @@ use super::{
     search::{Maps, Ray},
 };
 use crate::{
-    Equirect, Fresnel, Settings,
+    Equirect, Fresnel,
+    optics::walk::Walk as Rays,
     shader::{
         CLASS_BODY, CLASS_SPLASH, OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_OTHER_WALL,
         OUTCOME_REFLECTION_LIMIT, OUTCOME_SCENE, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH, SIDE_BACK,
@@ -41,9 +42,8 @@ fn mirror(dir: DVec3, n: DVec3) -> DVec3 {
     reflect(dir.as_vec3(), n.as_vec3()).as_dvec3().normalize()
 }
 
-/// Walks the view ray of one pixel. Of the settings, those of the optics are used; index and absorption are the
-/// frame's.
-pub fn walk(maps: &Maps, settings: &Settings, environment: &Equirect, pixel: [usize; 2]) -> Walk {
+/// Walks the view ray of one pixel. Index and absorption are the frame's.
+pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize; 2]) -> Walk {
     let frame = maps.frame;
     let to_world = Mat3::from_mat4(frame.view).as_dmat3().transpose();
     let background = |x: DVec3, dir: DVec3| maps.background(environment, x, dir);

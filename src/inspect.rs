@@ -1,0 +1,126 @@
+//! What a frame left behind, for tests, dumps and studies of the method: targets by name, and what walks met. No host needs
+//! it to draw; the feature `inspect` brings it, with the CPU twins and the tables of shaders.
+
+pub use crate::{
+    access::{Access, Barrier, State},
+    optics::walk::Walk,
+    resources::{ImageSpec, Spec},
+};
+use crate::{
+    Camera, Error, Renderer, Settings,
+    frame::Scene,
+    recorder::PlanEntry,
+    resources::Resource,
+    shader::Frame,
+    space::Space,
+};
+use ash::vk;
+use glam::Vec3;
+
+/// What frames write beside the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Inspection {
+    /// What each walk met, into "walk (debug)" and "final direction (debug)".
+    pub walks: bool,
+    /// Where positions are prepared on the device, so many neighbours of every particle, into "neighbours (debug)": for
+    /// each its index, how many there are, and the indices of the first of them; 0 lists none.
+    pub neighbours: u32,
+}
+
+impl Inspection {
+    pub(crate) fn apply(&self, scene: &mut Scene) {
+        scene.walks = self.walks;
+        if let Some(p) = &mut scene.prepare {
+            p.neighbours = self.neighbours;
+        }
+    }
+}
+
+/// The block that shaders read; see [`Camera`].
+pub fn uniforms(
+    camera: &Camera,
+    settings: &Settings,
+    size: [u32; 2],
+    space: &Space,
+    bounds: (Vec3, Vec3),
+) -> Frame {
+    camera.uniforms(settings, size, space, bounds)
+}
+
+impl Renderer {
+    /// Says what frames to come write beside the picture.
+    pub fn inspect(&mut self, inspection: Inspection) {
+        self.inspection = inspection;
+    }
+
+    /// Names of the targets and buffers of the last frame.
+    pub fn targets(&self) -> Vec<&'static str> {
+        self.tables.iter().flat_map(|t| t.names()).collect()
+    }
+
+    /// How a resource of the last frame was made; `None` if that frame did without it.
+    pub fn spec(&self, name: &str) -> Option<Spec> {
+        self.tables.iter().find_map(|t| t.get(name)).map(|e| e.spec)
+    }
+}
+
+impl Renderer {
+    /// Records a copy of one layer of a target (tightly packed rows) or of a whole buffer, as the last frame left it.
+    ///
+    /// # Safety
+    /// `cmd` is recording, outside rendering, and runs after the frame; `to` holds the content from `offset` on, was
+    /// made with `TRANSFER_DST`, and is made visible to the host by the caller.
+    pub unsafe fn record_copy(
+        &mut self,
+        cmd: vk::CommandBuffer,
+        name: &'static str,
+        layer: u32,
+        to: vk::Buffer,
+        offset: u64,
+    ) -> Result<(), Error> {
+        let device = &self.host.device;
+        let Some(entry) = self.tables.iter_mut().find_map(|t| t.get_mut(name)) else {
+            return Err(Error::parameter("target", name, "the last frame did without it"));
+        };
+        let is_image = matches!(entry.resource, Resource::Image(_));
+        if let Some(barrier) = entry.state.step(Access::TransferRead, is_image) {
+            self.barriers.push(PlanEntry { pass: "copy", resource: name, barrier });
+            let (image, buffer);
+            let info = match &entry.resource {
+                Resource::Image(i) => {
+                    image = barrier.on_image(i.handle, i.aspect);
+                    vk::DependencyInfo::default().image_memory_barriers(std::slice::from_ref(&image))
+                }
+                Resource::Buffer(b) => {
+                    buffer = barrier.on_buffer(b.handle);
+                    vk::DependencyInfo::default().buffer_memory_barriers(std::slice::from_ref(&buffer))
+                }
+            };
+            // SAFETY: `cmd` is recording outside rendering; the resource is alive and its layout tracked.
+            unsafe { device.cmd_pipeline_barrier2(cmd, &info) };
+        }
+        match (&entry.resource, entry.spec) {
+            (Resource::Image(image), Spec::Image(spec)) => {
+                let layers = vk::ImageSubresourceLayers {
+                    aspect_mask: image.aspect,
+                    mip_level: 0,
+                    base_array_layer: layer,
+                    layer_count: 1,
+                };
+                let extent = vk::Extent3D { width: spec.size[0], height: spec.size[1], depth: 1 };
+                let copy =
+                    vk::BufferImageCopy::default().buffer_offset(offset).image_subresource(layers).image_extent(extent);
+                let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+                // SAFETY: the image was just brought into this layout; the rest is this function's contract.
+                unsafe { device.cmd_copy_image_to_buffer(cmd, image.handle, layout, to, &[copy]) };
+            }
+            (Resource::Buffer(buffer), Spec::Buffer { bytes, .. }) => {
+                let copy = vk::BufferCopy { src_offset: 0, dst_offset: offset, size: bytes };
+                // SAFETY: as above.
+                unsafe { device.cmd_copy_buffer(cmd, buffer.handle, to, &[copy]) };
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,123 @@
+//! How a liquid is drawn: one member of each family, and which go together.
+
+use crate::{Error, layers::Layers, optics::Optics, smooth::Smooth};
+
+/// Layers of surfaces, their smoothing, and the optics between them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Method {
+    /// Which surfaces are kept of the particles.
+    pub layers: Layers,
+    /// How they are smoothed.
+    pub smooth: Smooth,
+    /// How light goes through them.
+    pub optics: Optics,
+}
+
+impl Default for Method {
+    /// Imai16's.
+    fn default() -> Self {
+        PRESETS[0].method()
+    }
+}
+
+/// What layers have to offer, and smoothing and optics ask for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Offers {
+    /// The far side of the liquid.
+    pub backs: bool,
+    /// Normals of the particles' own surfaces.
+    pub normals: bool,
+}
+
+impl Offers {
+    const WORDS: [&'static str; 2] = ["the far side of the liquid", "the particles' own normals"];
+
+    fn all(self) -> [bool; 2] {
+        [self.backs, self.normals]
+    }
+}
+
+impl Method {
+    /// Checks every parameter, and that the three go together.
+    pub fn validate(&self) -> Result<(), Error> {
+        self.layers.parameters().validate()?;
+        self.smooth.parameters().validate()?;
+        self.optics.parameters().validate()?;
+        let offered = self.layers.member().offers();
+        let asked = [
+            ("smooth", self.smooth.name(), self.smooth.member().asks()),
+            ("optics", self.optics.name(), self.optics.member().asks()),
+        ];
+        for (family, name, asks) in asked {
+            let lacking = asks.all().into_iter().zip(offered.all()).position(|(asks, has)| asks && !has);
+            if let Some(i) = lacking {
+                let having = |l: &Layers| l.member().offers().all()[i];
+                let others: Vec<_> = Layers::all().iter().filter(|l| having(l)).map(Layers::name).collect();
+                let remedy = format!(
+                    "it needs {}, which layers {} do not have: use layers {}",
+                    Offers::WORDS[i],
+                    self.layers.name(),
+                    others.join(" or ")
+                );
+                return Err(Error::parameter(family, name, remedy));
+            }
+        }
+        Ok(())
+    }
+
+    /// The published method of this name.
+    pub fn preset(name: &str) -> Option<Method> {
+        PRESETS.iter().find(|p| p.name == name).map(Preset::method)
+    }
+}
+
+/// A published method: nothing but choices.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct Preset {
+    /// Short name of the paper.
+    pub name: &'static str,
+    /// Names of the members it is made of.
+    pub members: [&'static str; 3],
+    /// Where their defaults are not the paper's: parameter and value.
+    pub values: &'static [(&'static str, &'static str)],
+}
+
+/// The published methods; the first is what is drawn when nothing is said.
+pub const PRESETS: &[Preset] = &[Preset { name: "imai16", members: ["split", "plane-fit", "four"], values: &[] }];
+
+impl Preset {
+    /// The choices it stands for.
+    pub fn method(&self) -> Method {
+        let [layers, smooth, optics] = self.members;
+        let made = || {
+            let mut method = Method {
+                layers: Layers::named(layers)?,
+                smooth: Smooth::named(smooth)?,
+                optics: Optics::named(optics)?,
+            };
+            for (name, value) in self.values {
+                method.set(name, value).ok()?;
+            }
+            Some(method)
+        };
+        // A test makes each of them.
+        made().unwrap_or_else(|| panic!("the preset {} names what is not there", self.name))
+    }
+}
+
+impl Method {
+    /// Sets a parameter of whichever member has it, from text.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<(), Error> {
+        let mut known = Vec::new();
+        for member in [self.layers.parameters_mut(), self.smooth.parameters_mut(), self.optics.parameters_mut()] {
+            let own = member.parameters();
+            if own.iter().any(|p| p.name == name) {
+                return member.set(name, text);
+            }
+            known.extend(own);
+        }
+        Err(crate::parameters::unknown(name, &known))
+    }
+}

@@ -1,0 +1,30 @@
+//! Light bends at up to four surfaces.
+
+use super::{Fresnel, Shading, walk::Walk};
+use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::parameters, plan::Plan};
+
+parameters! {
+    /// Up to four refractions, through two volumes of liquid (Imai16 §4.4), with total internal reflection.
+    pub struct Four {
+        /// Total internal reflections followed in one walk
+        internal_reflections: u32 = 4, "", "0 to 64" => |n| *n <= 64;
+        /// Reflectance
+        fresnel: Fresnel = Fresnel::Schlick, "", "schlick (Schlick's approximation) or exact" => |_| true;
+    }
+}
+
+impl Shading for Four {
+    fn asks(&self) -> Offers {
+        Offers { backs: true, ..Offers::default() }
+    }
+
+    fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
+        Walk::from(*self).record(plan, scene, surfaces);
+    }
+}
+
+impl From<Four> for Walk {
+    fn from(p: Four) -> Walk {
+        Walk { refractions: 4, internal_reflections: p.internal_reflections, fresnel: p.fresnel }
+    }
+}

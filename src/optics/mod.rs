@@ -1,0 +1,45 @@
+//! How light goes through the liquid's surfaces.
+
+pub mod four;
+pub mod one;
+mod tiles;
+pub mod two;
+pub(crate) mod walk;
+
+use crate::{
+    frame::Scene,
+    layers::Surfaces,
+    method::Offers,
+    parameters::{choices, family},
+    plan::Plan,
+};
+
+family! {
+    /// How light goes through the liquid's surfaces.
+    pub enum Optics: Shading {
+        Four(four) = "four",
+        Two(two) = "two",
+        One(one) = "one",
+    }
+}
+
+/// A member of the family.
+pub(crate) trait Shading {
+    /// What it asks of the layers.
+    fn asks(&self) -> Offers {
+        Offers::default()
+    }
+    /// Draws the picture.
+    fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces);
+}
+
+choices! {
+    /// Reflectance of the water surface.
+    pub enum Fresnel {
+        /// Schlick's approximation (Imai16).
+        #[default]
+        Schlick = "schlick",
+        /// Exact, for unpolarised light between dielectrics.
+        Exact = "exact",
+    }
+}

@@ -1,0 +1,25 @@
+//! Light bends once, where it enters.
+
+use super::{Fresnel, Shading, walk::Walk};
+use crate::{frame::Scene, layers::Surfaces, parameters::parameters, plan::Plan};
+
+parameters! {
+    /// One refraction, at the front; far sides are not even drawn.
+    pub struct One {
+        /// Reflectance
+        fresnel: Fresnel = Fresnel::Schlick, "", "schlick (Schlick's approximation) or exact" => |_| true;
+    }
+}
+
+impl Shading for One {
+    fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
+        Walk::from(*self).record(plan, scene, surfaces);
+    }
+}
+
+impl From<One> for Walk {
+    fn from(p: One) -> Walk {
+        // Inside the body nothing is followed; the number is the default's, so that pipelines are shared.
+        Walk { refractions: 1, internal_reflections: 4, fresnel: p.fresnel }
+    }
+}

@@ -1,0 +1,30 @@
+//! Light bends at up to two surfaces.
+
+use super::{Fresnel, Shading, walk::Walk};
+use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::parameters, plan::Plan};
+
+parameters! {
+    /// Up to two refractions, through one volume of liquid (Imai14), with total internal reflection.
+    pub struct Two {
+        /// Total internal reflections followed in one walk
+        internal_reflections: u32 = 4, "", "0 to 64" => |n| *n <= 64;
+        /// Reflectance
+        fresnel: Fresnel = Fresnel::Schlick, "", "schlick (Schlick's approximation) or exact" => |_| true;
+    }
+}
+
+impl Shading for Two {
+    fn asks(&self) -> Offers {
+        Offers { backs: true, ..Offers::default() }
+    }
+
+    fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
+        Walk::from(*self).record(plan, scene, surfaces);
+    }
+}
+
+impl From<Two> for Walk {
+    fn from(p: Two) -> Walk {
+        Walk { refractions: 2, internal_reflections: p.internal_reflections, fresnel: p.fresnel }
+    }
+}

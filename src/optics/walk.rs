@@ -1,0 +1,97 @@
+//! The walk of each view ray through the liquid, and its colour (`glsl/refract.frag`; Imai16 §4.4, §4.5).
+
+use super::{Fresnel, Optics, tiles};
+use crate::{
+    frame::Scene,
+    input::{Background, EnvironmentShape},
+    layers::{Surface, Surfaces},
+    plan::{Call, External, Plan, Rendering, Target, Vertices},
+    resources::ImageSpec,
+    shader::{REFRACT_FRAG, REFRACT_VERT},
+};
+use ash::vk::Format;
+
+/// What a walk is told: the members of [`Optics`] that follow rays are such.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Walk {
+    /// Surfaces at which light bends: 1, 2 or 4.
+    pub refractions: u32,
+    /// Total internal reflections followed.
+    pub internal_reflections: u32,
+    /// Reflectance.
+    pub fresnel: Fresnel,
+}
+
+impl Walk {
+    /// The walk that optics stand for, if they are one.
+    pub fn of(optics: &Optics) -> Option<Walk> {
+        match *optics {
+            Optics::Four(p) => Some(p.into()),
+            Optics::Two(p) => Some(p.into()),
+            Optics::One(p) => Some(p.into()),
+        }
+    }
+
+    pub(super) fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
+        // Of a class without particles the shader does not look at its maps, but something has to be bound: the other
+        // class's, or without any particles what no shader has written.
+        let any = surfaces.body.or(surfaces.splash).unwrap_or_else(|| placeholder(plan));
+        let (body, splash) = (surfaces.body.unwrap_or(any), surfaces.splash.unwrap_or(any));
+        // Where rays outside the liquid need not look for a second volume.
+        let second = self.refractions == 4 && scene.count > 0;
+        let tiles = if second { tiles::record(plan, scene, &body, &splash) } else { body.depth };
+
+        let has_scene = scene.has_scene;
+        let cube = scene.environment == EnvironmentShape::Cube;
+        let variant = usize::from(scene.walks) + 2 * usize::from(has_scene) + 4 * usize::from(cube);
+        let mut call = Call::draw(&REFRACT_VERT, &REFRACT_FRAG[variant])
+            .read("body_depth", body.depth)
+            .read("body_normal", body.normal)
+            .read("splash_depth", splash.depth)
+            .read("splash_normal", splash.normal)
+            .read("front_tiles", tiles)
+            .read("environment", plan.given(External::Environment))
+            .constant("REFRACTIONS", self.refractions)
+            .constant("INTERNAL_REFLECTIONS", self.internal_reflections)
+            .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact)
+            .constant("HAS_SPLASH", scene.splash)
+            .constant("HAS_BODY", scene.body)
+            .constant("ENCODE_SRGB", scene.encode_srgb())
+            .constant("HOST_BACKGROUND", scene.background == Background::Host);
+        if has_scene {
+            call = call
+                .read("scene_color", plan.given(External::SceneColor))
+                .read("scene_depth", plan.given(External::SceneDepth));
+        }
+        let output = plan.given(External::Output(scene.output));
+        let mut rendering = Rendering::into(output, 0).keeping(scene.background == Background::Host);
+        if scene.walks {
+            for name in ["walk (debug)", "final direction (debug)"] {
+                rendering = rendering.and(plan.flat(name, Format::R32G32B32A32_SFLOAT), 0);
+            }
+        }
+        plan.render("refract", rendering, vec![(call, Vertices::Direct(3))]);
+    }
+}
+
+/// Maps that nothing looks at.
+fn placeholder(plan: &mut Plan) -> Surface {
+    let mut one = |name, format| -> Target {
+        plan.image(name, ImageSpec { format, size: [1, 1], layers: 1, array: true, usage: Default::default() })
+    };
+    let (depth, normal) = (one("no depth", Format::R32_SFLOAT), one("no normal", Format::R32_UINT));
+    Surface { depth, normal, sides: 1 }
+}
+
+/// Whether a format takes light as it is (float, or sRGB, which the hardware encodes) or encoded by the shader (UNORM);
+/// `None` for formats that cannot hold a picture.
+pub(crate) fn takes_linear(format: Format) -> Option<bool> {
+    use Format as F;
+    match format {
+        F::R32G32B32A32_SFLOAT | F::R16G16B16A16_SFLOAT | F::B10G11R11_UFLOAT_PACK32 => Some(true),
+        F::R8G8B8A8_SRGB | F::B8G8R8A8_SRGB | F::A8B8G8R8_SRGB_PACK32 => Some(true),
+        F::R8G8B8A8_UNORM | F::B8G8R8A8_UNORM | F::A8B8G8R8_UNORM_PACK32 => Some(false),
+        F::A2B10G10R10_UNORM_PACK32 | F::A2R10G10B10_UNORM_PACK32 | F::R16G16B16A16_UNORM => Some(false),
+        _ => None,
+    }
+}

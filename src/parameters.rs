@@ -1,0 +1,242 @@
+//! Parameters, each described once: name, meaning, unit, range and default stand where it is declared, and the command
+//! line, scene files, records and checks follow from that.
+
+use crate::Error;
+use glam::Vec3;
+
+/// What is known of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Parameter {
+    /// Name in files and, with hyphens, on the command line.
+    pub name: &'static str,
+    /// What it is.
+    pub doc: &'static str,
+    /// Unit; empty where it has none.
+    pub unit: &'static str,
+    /// What it must be, as in "use …".
+    pub range: &'static str,
+    /// Words to choose from; empty if any value of the range will do.
+    pub choices: &'static [&'static str],
+    /// Value it has when nothing is said.
+    pub default: String,
+    /// Value it has.
+    pub value: String,
+}
+
+/// A group of parameters.
+pub trait Parameters {
+    /// Every parameter, in order.
+    fn parameters(&self) -> Vec<Parameter>;
+    /// Sets one by name, from text; [`Parameters::validate`] checks ranges.
+    fn set(&mut self, name: &str, text: &str) -> Result<(), Error>;
+    /// Checks every range.
+    fn validate(&self) -> Result<(), Error>;
+}
+
+/// What a parameter can hold.
+pub trait Value: Copy + PartialEq {
+    /// Words to choose from, if it is a choice.
+    const CHOICES: &'static [&'static str] = &[];
+    /// From text.
+    fn parse(text: &str) -> Option<Self>;
+    /// As text, which [`Value::parse`] reads again.
+    fn text(self) -> String;
+}
+
+macro_rules! plain_value {
+    ($($Type:ty),*) => {$(
+        impl Value for $Type {
+            fn parse(text: &str) -> Option<Self> {
+                text.trim().parse().ok()
+            }
+            fn text(self) -> String {
+                self.to_string()
+            }
+        }
+    )*};
+}
+plain_value!(u32, f32);
+
+impl Value for bool {
+    const CHOICES: &'static [&'static str] = &["true", "false"];
+    fn parse(text: &str) -> Option<Self> {
+        text.trim().parse().ok()
+    }
+    fn text(self) -> String {
+        self.to_string()
+    }
+}
+
+impl Value for Vec3 {
+    fn parse(text: &str) -> Option<Self> {
+        let parts: Result<Vec<f32>, _> = text.split(',').map(|t| t.trim().parse()).collect();
+        <[f32; 3]>::try_from(parts.ok()?).ok().map(Vec3::from_array)
+    }
+    fn text(self) -> String {
+        format!("{},{},{}", self.x, self.y, self.z)
+    }
+}
+
+/// An enum whose members are words.
+macro_rules! choices {
+    ($(#[$meta:meta])* pub enum $Name:ident { $($(#[$about:meta])* $Member:ident = $word:literal,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        pub enum $Name { $($(#[$about])* #[cfg_attr(feature = "serde", serde(rename = $word))] $Member,)* }
+
+        impl $crate::parameters::Value for $Name {
+            const CHOICES: &'static [&'static str] = &[$($word),*];
+            fn parse(text: &str) -> Option<Self> {
+                match text { $($word => Some(Self::$Member),)* _ => None }
+            }
+            fn text(self) -> String {
+                match self { $(Self::$Member => $word.into(),)* }
+            }
+        }
+    };
+}
+pub(crate) use choices;
+
+/// A struct of parameters: for each its documentation, type and default, then unit, what it must be, and a check of that.
+macro_rules! parameters {
+    ($(#[$meta:meta])* pub struct $Name:ident { $(
+        $(#[doc = $doc:literal])+
+        $field:ident: $Type:ty = $default:expr, $unit:literal, $range:literal => $check:expr;
+    )* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+        #[non_exhaustive]
+        pub struct $Name { $(
+            $(#[doc = $doc])+
+            #[doc = concat!("\n\n", "Unit: ", $unit, ". Use ", $range, ". Default: `", stringify!($default), "`.")]
+            pub $field: $Type,
+        )* }
+
+        impl Default for $Name {
+            fn default() -> Self {
+                $Name { $($field: $default,)* }
+            }
+        }
+
+        impl $Name { $(
+            #[doc = concat!("The same with another [`", stringify!($Name), "::", stringify!($field), "`].")]
+            #[must_use]
+            pub fn $field(mut self, value: $Type) -> Self {
+                self.$field = value;
+                self
+            }
+        )* }
+
+        #[allow(unused_variables)]
+        impl $crate::parameters::Parameters for $Name {
+            fn parameters(&self) -> Vec<$crate::parameters::Parameter> {
+                #[allow(unused_imports)]
+                use $crate::parameters::Value;
+                let default = Self::default();
+                vec![$($crate::parameters::Parameter {
+                    name: stringify!($field),
+                    doc: concat!($($doc,)+).trim_ascii(),
+                    unit: $unit,
+                    range: $range,
+                    choices: <$Type>::CHOICES,
+                    default: default.$field.text(),
+                    value: self.$field.text(),
+                },)*]
+            }
+
+            fn set(&mut self, name: &str, text: &str) -> Result<(), $crate::Error> {
+                match name {
+                    $(stringify!($field) => {
+                        let value = <$Type as $crate::parameters::Value>::parse(text);
+                        self.$field = value.ok_or_else(|| {
+                            $crate::Error::parameter(stringify!($field), text, concat!("use ", $range))
+                        })?;
+                        Ok(())
+                    })*
+                    _ => Err($crate::parameters::unknown(name, &self.parameters())),
+                }
+            }
+
+            fn validate(&self) -> Result<(), $crate::Error> {
+                #[allow(unused_imports)]
+                use $crate::parameters::Value;
+                $(
+                    let check: fn(&$Type) -> bool = $check;
+                    if !check(&self.$field) {
+                        let text = self.$field.text();
+                        return Err($crate::Error::parameter(stringify!($field), text, concat!("use ", $range)));
+                    }
+                )*
+                Ok(())
+            }
+        }
+    };
+}
+pub(crate) use parameters;
+
+/// A parameter that is not there, among those that are.
+pub(crate) fn unknown(name: &str, known: &[Parameter]) -> Error {
+    let names: Vec<_> = known.iter().map(|p| p.name).collect();
+    let there = if names.is_empty() { "there are none".to_owned() } else { format!("there are {}", names.join(", ")) };
+    Error::parameter("parameter", name, there)
+}
+
+/// A family of methods that do the same work: one enum, each member with parameters of its own in a module of its own.
+macro_rules! family {
+    ($(#[$meta:meta])* pub enum $Family:ident: $Trait:ident { $($Member:ident($module:ident) = $name:literal,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(tag = "name"))]
+        #[non_exhaustive]
+        pub enum $Family { $(
+            #[doc = concat!("`", $name, "`: see [`", stringify!($module), "`].")]
+            #[cfg_attr(feature = "serde", serde(rename = $name))]
+            $Member($module::$Member),
+        )* }
+
+        impl $Family {
+            /// Names of the members.
+            pub const NAMES: &'static [&'static str] = &[$($name),*];
+
+            /// Each member with its default parameters.
+            pub fn all() -> Vec<$Family> {
+                vec![$($Family::$Member(Default::default())),*]
+            }
+
+            /// The member of this name, with its default parameters.
+            pub fn named(name: &str) -> Option<$Family> {
+                match name { $($name => Some($Family::$Member(Default::default())),)* _ => None }
+            }
+
+            /// The member's name.
+            pub fn name(&self) -> &'static str {
+                match self { $($Family::$Member(_) => $name,)* }
+            }
+
+            /// The member's parameters.
+            pub fn parameters(&self) -> &dyn $crate::parameters::Parameters {
+                match self { $($Family::$Member(p) => p,)* }
+            }
+
+            /// The member's parameters, to be changed.
+            pub fn parameters_mut(&mut self) -> &mut dyn $crate::parameters::Parameters {
+                match self { $($Family::$Member(p) => p,)* }
+            }
+
+            pub(crate) fn member(&self) -> &dyn $Trait {
+                match self { $($Family::$Member(p) => p,)* }
+            }
+        }
+
+        $(impl From<$module::$Member> for $Family {
+            fn from(member: $module::$Member) -> Self {
+                $Family::$Member(member)
+            }
+        })*
+    };
+}
+pub(crate) use family;

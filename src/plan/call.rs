@@ -1,0 +1,273 @@
+//! One use of a pipeline: which shaders, and what each of their names stands for.
+
+use super::{External, Made, Plan, Target};
+use crate::{
+    access::Access,
+    resources::Spec,
+    shader::{Binding, Kind, Shader},
+};
+use ash::vk;
+
+/// Everything that a pipeline is made from: two calls with the same recipe share one.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Recipe {
+    /// A compute shader; or a vertex and a fragment shader.
+    pub shaders: Vec<&'static Shader>,
+    /// Specialisation constants by id.
+    pub constants: Vec<(u32, u32)>,
+    pub topology: vk::PrimitiveTopology,
+    /// Formats of the colour attachments, and how each blends.
+    pub colors: Vec<(vk::Format, Blend)>,
+    /// Whether there is a depth attachment, tested and written; D32_SFLOAT.
+    pub depth: bool,
+}
+
+/// What becomes of a colour that is drawn over another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) enum Blend {
+    /// It replaces that.
+    #[default]
+    Replace,
+}
+
+impl Recipe {
+    pub fn stages(&self) -> vk::ShaderStageFlags {
+        match self.shaders.len() {
+            1 => vk::ShaderStageFlags::COMPUTE,
+            _ => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
+        }
+    }
+
+    /// The bindings of all shaders, each once.
+    pub fn bindings(&self) -> Vec<Binding> {
+        let mut all: Vec<Binding> = Vec::new();
+        for b in self.shaders.iter().flat_map(|s| s.bindings) {
+            if !all.contains(b) {
+                all.push(*b);
+            }
+        }
+        all
+    }
+
+    pub fn push_bytes(&self) -> u32 {
+        self.shaders.iter().map(|s| s.push_bytes).max().unwrap_or(0)
+    }
+
+    pub fn name(&self) -> &'static str {
+        self.shaders.last().map_or("", |s| s.name)
+    }
+}
+
+/// Four bytes for a shader.
+pub(crate) trait Word {
+    fn word(self) -> u32;
+}
+
+impl Word for u32 {
+    fn word(self) -> u32 {
+        self
+    }
+}
+
+impl Word for f32 {
+    fn word(self) -> u32 {
+        self.to_bits()
+    }
+}
+
+impl Word for bool {
+    fn word(self) -> u32 {
+        u32::from(self)
+    }
+}
+
+/// One use of a pipeline.
+pub(crate) struct Call {
+    pub recipe: Recipe,
+    /// By index in set 0, filled from `named` when the call is added to a plan.
+    pub bound: Vec<(Binding, Target, Access)>,
+    pub push: Vec<u8>,
+    named: Vec<(&'static str, Target, Way)>,
+    /// Members of the push-constant block that were set; the whole block at once is "".
+    pushed: Vec<&'static str>,
+    wrong: Option<String>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Read,
+    Write,
+    Update,
+}
+
+impl Call {
+    fn new(shaders: Vec<&'static Shader>) -> Call {
+        let recipe = Recipe {
+            shaders,
+            constants: Vec::new(),
+            topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+            colors: Vec::new(),
+            depth: false,
+        };
+        let push = vec![0; recipe.push_bytes() as usize];
+        Call { recipe, bound: Vec::new(), push, named: Vec::new(), pushed: Vec::new(), wrong: None }
+    }
+
+    pub fn compute(shader: &'static Shader) -> Call {
+        Call::new(vec![shader])
+    }
+
+    pub fn draw(vertex: &'static Shader, fragment: &'static Shader) -> Call {
+        Call::new(vec![vertex, fragment])
+    }
+
+    pub fn topology(mut self, topology: vk::PrimitiveTopology) -> Call {
+        self.recipe.topology = topology;
+        self
+    }
+
+    /// What the shaders call `name` is this resource, and is read.
+    pub fn read(mut self, name: &'static str, target: Target) -> Call {
+        self.named.push((name, target, Way::Read));
+        self
+    }
+
+    /// … and is written; of an image every texel is.
+    pub fn write(mut self, name: &'static str, target: Target) -> Call {
+        self.named.push((name, target, Way::Write));
+        self
+    }
+
+    /// … and is read and written.
+    pub fn update(mut self, name: &'static str, target: Target) -> Call {
+        self.named.push((name, target, Way::Update));
+        self
+    }
+
+    /// Sets a specialisation constant.
+    pub fn constant(mut self, name: &'static str, value: impl Word) -> Call {
+        let mut ids = self.recipe.shaders.iter().flat_map(|s| s.constants).filter(|c| c.1 == name).map(|c| c.0);
+        match ids.next() {
+            Some(id) => self.recipe.constants.push((id, value.word())),
+            None => self.complain(format!("no shader has a constant {name}")),
+        }
+        self
+    }
+
+    /// Sets a member of the push-constant block.
+    pub fn push(mut self, name: &'static str, value: impl Word) -> Call {
+        let members = self.recipe.shaders.iter().flat_map(|s| s.push);
+        match members.clone().find(|m| m.0 == name) {
+            Some((_, offset)) => {
+                self.push[*offset as usize..][..4].copy_from_slice(&value.word().to_ne_bytes());
+                self.pushed.push(name);
+            }
+            None => self.complain(format!("no shader has a push constant {name}")),
+        }
+        self
+    }
+
+    /// Sets the whole push-constant block.
+    pub fn push_all<T: bytemuck::Pod>(mut self, block: &T) -> Call {
+        let bytes = bytemuck::bytes_of(block);
+        if bytes.len() == self.push.len() {
+            self.push.copy_from_slice(bytes);
+            self.pushed.push("");
+        } else {
+            self.complain(format!("{} bytes are pushed, the shaders have {}", bytes.len(), self.push.len()));
+        }
+        self
+    }
+
+    fn complain(&mut self, problem: String) {
+        self.wrong.get_or_insert(problem);
+    }
+
+    /// Matches names with the shaders' own; gives every use, or says what does not fit.
+    pub(super) fn bind(&mut self, plan: &mut Plan) -> Result<Vec<(Target, Access)>, String> {
+        if let Some(problem) = self.wrong.take() {
+            return Err(problem);
+        }
+        let bindings = self.recipe.bindings();
+        for (i, b) in bindings.iter().enumerate() {
+            if bindings[..i].iter().any(|a| a.index == b.index) {
+                return Err(format!("binding {} is two things in two shaders", b.index));
+            }
+        }
+        let frame = bindings.iter().find(|b| matches!(b.kind, Kind::UniformBuffer(_)));
+        if let Some(b) = frame {
+            if b.kind != Kind::UniformBuffer(size_of::<crate::shader::Frame>() as u32) {
+                return Err(format!("{} is {:?}, and no frame block", b.name, b.kind));
+            }
+            self.bound.push((*b, plan.given(External::FrameBlock), Access::UniformRead));
+        }
+        for (name, target, way) in std::mem::take(&mut self.named) {
+            let Some(b) = bindings.iter().find(|b| b.name == name) else {
+                return Err(format!("no shader has a binding {name}"));
+            };
+            if self.bound.iter().any(|(other, ..)| other.index == b.index) {
+                return Err(format!("{name} is bound twice"));
+            }
+            fits(plan, b, target)?;
+            self.bound.push((*b, target, self.access(b, way)?));
+        }
+        let missing = |b: &&Binding| b.kind != Kind::Sampler && !self.bound.iter().any(|(o, ..)| o.index == b.index);
+        if let Some(b) = bindings.iter().find(missing) {
+            return Err(format!("nothing is bound to {}", b.name));
+        }
+        let members = self.recipe.shaders.iter().flat_map(|s| s.push);
+        if let Some((name, _)) = members.clone().find(|m| !self.pushed.contains(&m.0) && !self.pushed.contains(&"")) {
+            return Err(format!("the push constant {name} is not set"));
+        }
+        self.recipe.constants.sort_unstable();
+        Ok(self.bound.iter().map(|(_, target, access)| (*target, *access)).collect())
+    }
+
+    /// How the shader that has a binding touches what is bound there.
+    fn access(&self, b: &Binding, way: Way) -> Result<Access, String> {
+        let (image, storage) = match b.kind {
+            Kind::SampledImage(_) => (true, false),
+            Kind::StorageImage(_) => (true, true),
+            _ => (false, true),
+        };
+        if image && (way == Way::Read) == storage {
+            return Err(format!("{} is {:?}: sampled images are read, storage images written", b.name, b.kind));
+        }
+        if let [vertex, _] = self.recipe.shaders.as_slice() {
+            return match (way, vertex.bindings.contains(b)) {
+                (Way::Read, true) => Ok(Access::VertexRead),
+                (Way::Read, false) => Ok(Access::FragmentRead),
+                _ => Err(format!("{} is written while drawing", b.name)),
+            };
+        }
+        Ok(match way {
+            Way::Read => Access::ComputeRead,
+            Way::Write => Access::ComputeWrite,
+            Way::Update => Access::ComputeReadWrite,
+        })
+    }
+}
+
+/// Whether a resource is of the kind that the shader has at this binding.
+fn fits(plan: &Plan, b: &Binding, target: Target) -> Result<(), String> {
+    let declared = plan.resource(target);
+    let wanted = match b.kind {
+        Kind::SampledImage(texels) | Kind::StorageImage(texels) => Some(texels),
+        _ => None,
+    };
+    let fits = match (wanted, declared.made) {
+        (Some(texels), Made::Own(Spec::Image(spec))) => {
+            let uint = spec.format == vk::Format::R32_UINT;
+            texels.uint == uint && texels.array == spec.array && !texels.cube
+        }
+        (Some(texels), Made::Given(External::SceneColor | External::SceneDepth)) => !texels.uint && !texels.cube,
+        (Some(texels), Made::Given(External::Environment)) => !texels.uint,
+        (None, Made::Own(Spec::Buffer { .. })) => true,
+        (None, Made::Given(given)) => {
+            use External::{Centers, Diagonals, FrameBlock, Mixed, Positions};
+            matches!(given, FrameBlock | Positions | Centers | Diagonals | Mixed)
+        }
+        _ => false,
+    };
+    if fits { Ok(()) } else { Err(format!("{} is {:?}, and {} is not", b.name, b.kind, declared.name)) }
+}

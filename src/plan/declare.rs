@@ -1,0 +1,60 @@
+//! How passes declare their resources.
+
+use super::{Declared, External, Home, Made, Plan, Target};
+use crate::resources::{ImageSpec, Spec};
+use ash::vk;
+
+impl Plan {
+    fn declare(&mut self, name: &'static str, made: Made, per_particle: bool) -> Target {
+        if self.find(name).is_some() {
+            self.refuse(name, "two resources have this name".into());
+        }
+        self.resources.push(Declared { name, home: self.home, made, per_particle });
+        Target(self.resources.len() - 1)
+    }
+
+    /// A map of the whole view with one layer for each of so many sides: front, then back. Shaders see an array.
+    pub fn map(&mut self, name: &'static str, format: vk::Format, sides: u32) -> Target {
+        self.image(name, ImageSpec { format, size: self.size, layers: sides, array: true, usage: Default::default() })
+    }
+
+    /// A map of the whole view without layers.
+    pub fn flat(&mut self, name: &'static str, format: vk::Format) -> Target {
+        self.image(name, ImageSpec { format, size: self.size, layers: 1, array: false, usage: Default::default() })
+    }
+
+    /// Any image; what it is used for follows from its uses.
+    pub fn image(&mut self, name: &'static str, spec: ImageSpec) -> Target {
+        self.declare(name, Made::Own(Spec::Image(spec)), false)
+    }
+
+    /// A buffer of so many bytes.
+    pub fn buffer(&mut self, name: &'static str, bytes: u64) -> Target {
+        self.declare(name, Made::Own(Spec::Buffer { bytes, usage: Default::default() }), false)
+    }
+
+    /// A buffer whose bytes grow with the number of particles.
+    pub fn array(&mut self, name: &'static str, bytes: u64) -> Target {
+        self.declare(name, Made::Own(Spec::Buffer { bytes, usage: Default::default() }), true)
+    }
+
+    /// Something that is not the frame's own; the same one each time.
+    pub fn given(&mut self, external: External) -> Target {
+        if let Some(at) = self.resources.iter().position(|r| r.made == Made::Given(external)) {
+            return Target(at);
+        }
+        let (name, home) = match external {
+            External::FrameBlock => ("frame block", Home::View),
+            External::Positions => ("positions (host's)", Home::Particles),
+            External::Centers => ("particle centres", Home::Particles),
+            External::Diagonals => ("particle shapes (diagonal)", Home::Particles),
+            External::Mixed => ("particle shapes (mixed)", Home::Particles),
+            External::Environment => ("environment", Home::View),
+            External::SceneColor => ("scene colour (host's)", Home::View),
+            External::SceneDepth => ("scene depth (host's)", Home::View),
+            External::Output(_) => ("output (host's)", Home::View),
+        };
+        self.resources.push(Declared { name, home, made: Made::Given(external), per_particle: false });
+        Target(self.resources.len() - 1)
+    }
+}

@@ -1,0 +1,169 @@
+//! What a frame does, as data: the resources that its passes make, and their steps in order. Passes write it
+//! (`src/frame.rs` is the frame), the memory ledger, the pools and the pipelines follow from it, and
+//! [`crate::recorder`] records it.
+
+mod call;
+mod declare;
+mod step;
+
+pub(crate) use call::{Blend, Call, Recipe};
+pub(crate) use step::{Groups, Rendering, Step, Vertices, Work};
+
+use crate::{
+    Error,
+    access::Access,
+    resources::{ImageSpec, Spec},
+};
+use ash::vk;
+
+/// A resource of one plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct Target(usize);
+
+/// What a resource is there for: one set of particles, or one view of them. Each has a table of its own, so that several
+/// views can share the particles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Home {
+    Particles,
+    View,
+}
+
+/// What the frame uses and does not own; barriers for it are its owner's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum External {
+    /// The slot's uniform block, which the host has just written.
+    FrameBlock,
+    Positions,
+    Centers,
+    Diagonals,
+    Mixed,
+    Environment,
+    SceneColor,
+    SceneDepth,
+    Output(vk::Format),
+}
+
+/// How a resource comes to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Made {
+    Own(Spec),
+    Given(External),
+}
+
+pub(crate) struct Declared {
+    /// In the ledger, in the printed barriers and (after "meniscus") in debuggers; no two resources of a plan share one.
+    pub name: &'static str,
+    pub home: Home,
+    pub made: Made,
+    /// Whether its size is proportional to the number of particles.
+    pub per_particle: bool,
+}
+
+/// A frame's resources and steps.
+pub(crate) struct Plan {
+    /// Width and height of the view in pixels.
+    pub size: [u32; 2],
+    pub resources: Vec<Declared>,
+    pub steps: Vec<Step>,
+    home: Home,
+    /// What a pass got wrong first.
+    wrong: Option<Error>,
+}
+
+impl Plan {
+    /// An empty frame of so many pixels.
+    pub fn new(size: [u32; 2]) -> Plan {
+        Plan { size, resources: Vec::new(), steps: Vec::new(), home: Home::Particles, wrong: None }
+    }
+
+    /// Says what the passes that follow work for.
+    pub fn work_for(&mut self, home: Home) {
+        self.home = home;
+    }
+
+    /// The plan, unless a pass declared something that cannot be.
+    pub fn finish(mut self) -> Result<Plan, Error> {
+        // Whatever can be copied may be asked for afterwards.
+        #[cfg(feature = "inspect")]
+        for declared in &mut self.resources {
+            match &mut declared.made {
+                Made::Own(Spec::Buffer { usage, .. }) => *usage |= vk::BufferUsageFlags::TRANSFER_SRC,
+                Made::Own(Spec::Image(spec)) if spec.format != vk::Format::D32_SFLOAT => {
+                    spec.usage |= vk::ImageUsageFlags::TRANSFER_SRC;
+                }
+                _ => {}
+            }
+        }
+        match self.wrong.take() {
+            Some(e) => Err(e),
+            None => Ok(self),
+        }
+    }
+
+    fn refuse(&mut self, pass: &'static str, problem: String) {
+        self.wrong.get_or_insert(Error::Pass { pass, problem });
+    }
+
+    pub fn resource(&self, target: Target) -> &Declared {
+        &self.resources[target.0]
+    }
+
+    /// The resource of this name, if the frame has one.
+    pub fn find(&self, name: &str) -> Option<Target> {
+        self.resources.iter().position(|r| r.name == name).map(Target)
+    }
+
+    /// How an image of the frame's own is made.
+    fn image_spec(&self, target: Target) -> Option<&ImageSpec> {
+        match &self.resource(target).made {
+            Made::Own(Spec::Image(spec)) => Some(spec),
+            _ => None,
+        }
+    }
+
+    /// Notes a use of a resource: what it is used for decides what it has to be made for.
+    fn used(&mut self, pass: &'static str, target: Target, access: Access) {
+        let declared = &mut self.resources[target.0];
+        let fits = match &mut declared.made {
+            Made::Given(_) => true,
+            Made::Own(Spec::Image(spec)) => access.image_usage().map(|usage| spec.usage |= usage).is_some(),
+            Made::Own(Spec::Buffer { usage, .. }) => access.buffer_usage().map(|more| *usage |= more).is_some(),
+        };
+        if !fits {
+            let name = declared.name;
+            self.refuse(pass, format!("{name} cannot be used for {access:?}"));
+        }
+    }
+
+    /// Every pipeline that the frame binds, each once.
+    pub fn recipes(&self) -> Vec<&Recipe> {
+        let mut all: Vec<&Recipe> = Vec::new();
+        for call in self.steps.iter().flat_map(Step::calls) {
+            if !all.contains(&&call.recipe) {
+                all.push(&call.recipe);
+            }
+        }
+        all
+    }
+
+    /// Descriptor sets that the frame allocates, and descriptors of each type in all of them.
+    pub fn descriptors(&self) -> (u32, Vec<(vk::DescriptorType, u32)>) {
+        let (mut sets, mut counts) = (0, Vec::<(vk::DescriptorType, u32)>::new());
+        for call in self.steps.iter().flat_map(Step::calls) {
+            sets += 1;
+            for binding in call.recipe.bindings() {
+                let kind = binding.kind.descriptor_type();
+                match counts.iter_mut().find(|(k, _)| *k == kind) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((kind, 1)),
+                }
+            }
+        }
+        (sets, counts)
+    }
+
+    /// Scopes of the profiler: runs of steps of one pass.
+    pub fn scopes(&self) -> u32 {
+        self.steps.chunk_by(|a, b| a.pass == b.pass).count() as u32
+    }
+}

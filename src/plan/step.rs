@@ -1,0 +1,175 @@
+//! The steps of a frame: fills, dispatches, draws.
+
+use super::{Call, External, Made, Plan, Target, call::Blend};
+use crate::access::Access;
+use ash::vk;
+
+/// One thing that is recorded, with everything it touches; steps of one pass that follow each other share a label and a
+/// pair of timestamps.
+pub(crate) struct Step {
+    pub pass: &'static str,
+    pub home: super::Home,
+    pub uses: Vec<(Target, Access)>,
+    pub work: Work,
+}
+
+pub(crate) enum Work {
+    /// One word, all over a range of a buffer.
+    Fill { buffer: Target, offset: u64, bytes: u64, word: u32 },
+    Dispatch { call: Call, groups: Groups },
+    Render { rendering: Rendering, draws: Vec<(Call, Vertices)> },
+}
+
+/// Work groups of a dispatch.
+#[derive(Clone, Copy)]
+pub(crate) enum Groups {
+    Direct([u32; 3]),
+    /// From a buffer, at an offset in bytes.
+    Indirect(Target, u64),
+}
+
+/// What is drawn.
+#[derive(Clone, Copy)]
+pub(crate) enum Vertices {
+    /// So many vertices of one instance.
+    Direct(u32),
+    /// One draw from a buffer, at an offset in bytes.
+    Indirect(Target, u64),
+}
+
+/// What is drawn into.
+pub(crate) struct Rendering {
+    pub colors: Vec<Color>,
+    pub depth: Option<Depth>,
+}
+
+/// A colour attachment: one layer of an image.
+pub(crate) struct Color {
+    pub target: Target,
+    pub layer: u32,
+    /// Whether it keeps what it holds; it starts as zeros if not.
+    pub keep: bool,
+    pub blend: Blend,
+}
+
+/// A depth attachment, tested and written; what it holds is lost afterwards.
+pub(crate) struct Depth {
+    pub target: Target,
+    pub clear: f32,
+    pub compare: vk::CompareOp,
+}
+
+impl Rendering {
+    /// Into one layer of an image, from zeros.
+    pub fn into(target: Target, layer: u32) -> Rendering {
+        Rendering { colors: Vec::new(), depth: None }.and(target, layer)
+    }
+
+    /// And into one layer of another, from zeros.
+    pub fn and(mut self, target: Target, layer: u32) -> Rendering {
+        self.colors.push(Color { target, layer, keep: false, blend: Blend::Replace });
+        self
+    }
+
+    /// The last attachment keeps what it holds.
+    pub fn keeping(mut self, keep: bool) -> Rendering {
+        if let Some(color) = self.colors.last_mut() {
+            color.keep = keep;
+        }
+        self
+    }
+
+    /// With a depth test.
+    pub fn testing(mut self, target: Target, clear: f32, compare: vk::CompareOp) -> Rendering {
+        self.depth = Some(Depth { target, clear, compare });
+        self
+    }
+}
+
+impl Step {
+    /// The pipelines it binds.
+    pub fn calls(&self) -> impl Iterator<Item = &Call> {
+        let (one, many) = match &self.work {
+            Work::Fill { .. } => (None, &[][..]),
+            Work::Dispatch { call, .. } => (Some(call), &[][..]),
+            Work::Render { draws, .. } => (None, draws.as_slice()),
+        };
+        one.into_iter().chain(many.iter().map(|(call, _)| call))
+    }
+}
+
+impl Plan {
+    fn step(&mut self, pass: &'static str, uses: Vec<(Target, Access)>, work: Work) {
+        for (target, access) in &uses {
+            self.used(pass, *target, *access);
+        }
+        let home = self.home;
+        self.steps.push(Step { pass, home, uses, work });
+    }
+
+    /// Fills a buffer with one word, from an offset on, so many bytes (`vk::WHOLE_SIZE`: to its end).
+    pub fn fill(&mut self, pass: &'static str, buffer: Target, offset: u64, bytes: u64, word: u32) {
+        self.step(pass, vec![(buffer, Access::TransferWrite)], Work::Fill { buffer, offset, bytes, word });
+    }
+
+    /// A dispatch of a compute shader.
+    pub fn dispatch(&mut self, pass: &'static str, mut call: Call, groups: Groups) {
+        match call.bind(self) {
+            Ok(mut uses) => {
+                if let Groups::Indirect(arguments, _) = groups {
+                    uses.push((arguments, Access::IndirectRead));
+                }
+                self.step(pass, uses, Work::Dispatch { call, groups });
+            }
+            Err(problem) => self.refuse(pass, problem),
+        }
+    }
+
+    /// Draws into attachments of one size.
+    pub fn render(&mut self, pass: &'static str, rendering: Rendering, draws: Vec<(Call, Vertices)>) {
+        let mut formats = Vec::new();
+        for color in &rendering.colors {
+            let format = match (self.resource(color.target).made, self.image_spec(color.target)) {
+                (Made::Given(External::Output(format)), _) => format,
+                (_, Some(spec)) if color.layer < spec.layers => spec.format,
+                _ => return self.refuse(pass, format!("{} is no attachment", self.resource(color.target).name)),
+            };
+            formats.push((format, color.blend));
+        }
+        let mut uses: Vec<(Target, Access)> = Vec::new();
+        let mut add = |one: (Target, Access)| {
+            if !uses.contains(&one) {
+                uses.push(one);
+            }
+        };
+        let mut ready = Vec::with_capacity(draws.len());
+        for (mut call, vertices) in draws {
+            call.recipe.colors = formats.clone();
+            call.recipe.depth = rendering.depth.is_some();
+            match call.bind(self) {
+                Ok(uses) => uses.into_iter().for_each(&mut add),
+                Err(problem) => return self.refuse(pass, problem),
+            }
+            if let Vertices::Indirect(arguments, _) = vertices {
+                add((arguments, Access::IndirectRead));
+            }
+            ready.push((call, vertices));
+        }
+        rendering.colors.iter().for_each(|c| add((c.target, Access::ColorAttachment)));
+        rendering.depth.iter().for_each(|d| add((d.target, Access::DepthAttachment)));
+        let sizes: Vec<_> = uses_of_attachments(&rendering).map(|t| self.attachment_size(t)).collect();
+        if sizes.windows(2).any(|w| w[0] != w[1]) {
+            return self.refuse(pass, format!("its attachments are of different sizes: {sizes:?}"));
+        }
+        self.step(pass, uses, Work::Render { rendering, draws: ready });
+    }
+
+    /// Width and height of what is drawn into.
+    pub fn attachment_size(&self, target: Target) -> [u32; 2] {
+        self.image_spec(target).map_or(self.size, |spec| spec.size)
+    }
+}
+
+fn uses_of_attachments(rendering: &Rendering) -> impl Iterator<Item = Target> {
+    rendering.colors.iter().map(|c| c.target).chain(rendering.depth.iter().map(|d| d.target))
+}

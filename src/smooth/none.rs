@@ -1,0 +1,19 @@
+//! No smoothing: the body stays as its particles' surfaces are.
+
+use super::Filter;
+use crate::{
+    layers::Surface,
+    parameters::parameters,
+    plan::{Plan, Target},
+};
+
+parameters! {
+    /// The body as its particles' surfaces are.
+    pub struct Unsmoothed {}
+}
+
+impl Filter for Unsmoothed {
+    fn record(&self, _: &mut Plan, body: &Surface) -> Target {
+        body.depth
+    }
+}

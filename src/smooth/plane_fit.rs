@@ -1,0 +1,79 @@
+//! Smoothing by iterative plane fitting (`glsl/plane_fit.comp`; Imai16 §4.3).
+
+use super::{Filter, per_pixel};
+use crate::{
+    layers::Surface,
+    method::Offers,
+    parameters::{choices, parameters},
+    passes::counters,
+    plan::{Call, Plan, Target},
+    shader::PLANE_FIT_COMP,
+};
+use ash::vk::Format;
+
+choices! {
+    /// Weights of plane fitting (Imai16 fig. 5).
+    pub enum Weighting {
+        /// Difference of depths, eq. (2): keeps depth gaps.
+        #[default]
+        ViewDependent = "view-dependent",
+        /// Distance of eye-space points: smooths across gaps; the paper's rejected alternative.
+        Euclidean = "euclidean",
+    }
+}
+
+parameters! {
+    /// Iterative plane fitting (Imai16 §4.3).
+    pub struct PlaneFit {
+        /// Edge of the window
+        window: u32 = 9, "pixels", "an odd number from 3 to 25" => |w| w % 2 == 1 && (3..=25).contains(w);
+        /// How often planes are fitted
+        iterations: u32 = 2, "", "0 to 20" => |n| *n <= 20;
+        /// Standard deviation of the weights, sigma of eq. (2)
+        sigma: f32 = 5.3, "particle radii", "a finite value above 0, in particle radii"
+            => |s| s.is_finite() && *s > 0.0;
+        /// What weights are made of
+        weighting: Weighting = Weighting::ViewDependent, "", "view-dependent (eq. 2) or euclidean" => |_| true;
+    }
+}
+
+/// Edge of a work group: 16 bytes a tile entry have to fit the guaranteed 16 KiB of shared memory.
+fn tile(reach: u32) -> u32 {
+    if reach <= 8 { 16 } else { 8 }
+}
+
+impl Filter for PlaneFit {
+    fn asks(&self) -> Offers {
+        Offers { normals: true, ..Offers::default() }
+    }
+
+    fn record(&self, plan: &mut Plan, body: &Surface) -> Target {
+        let reach = self.window / 2;
+        let edge = tile(reach);
+        let counters = counters(plan);
+        let mut from = body.depth;
+        // The two that iterations alternate between; the second only if there is a second iteration.
+        let mut targets = ["body depth (smoothed, odd)", "body depth (smoothed, even)"]
+            .into_iter()
+            .take(self.iterations as usize)
+            .map(|name| plan.map(name, Format::R32_SFLOAT, body.sides))
+            .collect::<Vec<_>>();
+        for _ in 0..self.iterations {
+            let to = targets[0];
+            let call = Call::compute(&PLANE_FIT_COMP)
+                .read("depth_in", from)
+                .read("normal_raw", body.normal)
+                .write("depth_out", to)
+                .update("counters", counters)
+                .constant("local_size_x", edge)
+                .constant("local_size_y", edge)
+                .constant("REACH", reach)
+                .constant("EUCLIDEAN", self.weighting == Weighting::Euclidean);
+            let groups = per_pixel(plan, edge, body.sides);
+            plan.dispatch("plane fit", call, groups);
+            from = to;
+            targets.rotate_left(1);
+        }
+        from
+    }
+}
