@@ -8,6 +8,7 @@ use glam::{UVec4, Vec4};
 /// Positions in device memory, to be prepared within the frame that draws them: neighbours, classes and ellipsoids as
 /// [`super::prepare`] makes them, but on the GPU, and with no word about them to the host.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct DevicePositions {
     /// The host's buffer, with usage `STORAGE_BUFFER`: three 32-bit floats a particle, in world units. A position that is
     /// not finite is left out.
@@ -32,6 +33,24 @@ impl DevicePositions {
     pub fn packed(buffer: vk::Buffer, count: u32, radius: f32) -> DevicePositions {
         let options = Options::default();
         DevicePositions { buffer, offset: 0, stride: 12, count, radius, options, keep_class_below: None }
+    }
+
+    /// The same, beginning at a byte of the buffer and lying so many bytes apart.
+    #[must_use]
+    pub fn laid_out(self, offset: u64, stride: u64) -> Self {
+        DevicePositions { offset, stride, ..self }
+    }
+
+    /// The same with other options.
+    #[must_use]
+    pub fn options(self, options: Options) -> Self {
+        DevicePositions { options, ..self }
+    }
+
+    /// The same with hysteresis: see [`DevicePositions::keep_class_below`].
+    #[must_use]
+    pub fn keep_class_below(self, share: impl Into<Option<f32>>) -> Self {
+        DevicePositions { keep_class_below: share.into(), ..self }
     }
 
     /// Entries a particle has in the sort, and the edge of a cell in supports.

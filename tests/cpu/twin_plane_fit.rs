@@ -5,16 +5,24 @@ use meniscus::shader::Frame;
 use meniscus::space::Space;
 use meniscus::twin::normal::{decode_normal, encode_normal};
 use meniscus::twin::plane_fit::{Fit, Outcome, plane_fit, view_ray};
-use meniscus::{Camera, Settings, Weighting};
+use meniscus::inspect::uniforms;
+use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
+use meniscus::{Camera, Method, Settings};
 
 const SIZE: [u32; 2] = [61, 47];
+
+fn settings(sigma: f32) -> Settings {
+    let mut method = Method::default();
+    method.smooth = PlaneFit::default().sigma(sigma).into();
+    method.into()
+}
 
 /// Uniforms of a camera 40 degrees high, in a space of radius 1; `sigma` in that too.
 pub fn frame(size: [u32; 2], sigma: f32) -> Frame {
     let camera =
         Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40f32.to_radians(), size[0] as f32 / size[1] as f32, 0.01);
     let space = Space::new(1.0, Vec3::ZERO);
-    camera.uniforms(&Settings { sigma, ..Settings::default() }, size, &space, (Vec3::ZERO, Vec3::ONE))
+    uniforms(&camera, &settings(sigma), size, &space, (Vec3::ZERO, Vec3::ONE))
 }
 
 /// A plane's normal as a code and as what the code says: of the two only the latter is exact.
