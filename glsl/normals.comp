@@ -1,6 +1,7 @@
 // Normals of the smoothed body surface: one-sided differences of eye-space positions, on each axis the side with the
 // smaller depth jump (Green10). Fronts face the viewer, backs face away.
 #version 460
+// Compiled with any of: RAW
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
@@ -8,7 +9,9 @@
 #include "normal.glsl"
 layout(local_size_x = IMAGE_GROUP, local_size_y = IMAGE_GROUP) in;
 layout(set = 0, binding = 1) uniform texture2DArray depth_in;
-layout(set = 0, binding = 2) uniform utexture2DArray normal_raw;
+#ifdef RAW
+layout(set = 0, binding = 2) uniform utexture2DArray normal_raw; // where differences say nothing
+#endif
 layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2DArray normal_out;
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 
@@ -41,7 +44,11 @@ void main() {
             float away = dot(n, v);
             result = encode_normal(n * (((away > 0.0) == (layer == SIDE_BACK)) ? 1.0 / size : -1.0 / size));
         } else {
+#ifdef RAW
             result = texelFetch(normal_raw, ivec3(pixel, layer), 0).x;
+#else
+            result = encode_normal((layer == SIDE_BACK ? 1.0 : -1.0) * normalize(v));
+#endif
             atomicAdd(counters.at[COUNT_NORMAL_DEGENERATE], 1u);
         }
     }
