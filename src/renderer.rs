@@ -18,7 +18,7 @@ use crate::{
     targets::{self, Id, LedgerEntry, Needs, Preparation, Spec},
 };
 use ash::vk;
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use uploads::PARTICLE_ARRAYS;
 
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
@@ -254,14 +254,14 @@ impl Renderer {
             _ => None,
         };
         if let Some(p) = &mut prepare {
-            p.options.z = u32::from(classes.is_some() && classes == self.last_classes);
+            p.has_last_classes = u32::from(classes.is_some() && classes == self.last_classes);
         }
         self.last_classes = classes;
 
-        block.particles.x = needs.count;
-        block.particles.z = self.limits.point_size as u32;
-        block.particles.w = u32::from(input.settings.quads_only || self.limits.point_size <= 1.0);
-        block.scene.w = f32::from(input.eye_inside);
+        block.count = needs.count;
+        block.largest_point = self.limits.point_size as u32;
+        block.quads_only = u32::from(input.settings.quads_only || self.limits.point_size <= 1.0);
+        block.eye_inside = f32::from(input.eye_inside);
         let externals = Externals {
             frame_block: slot.frame_block.handle,
             positions,
@@ -277,7 +277,9 @@ impl Renderer {
         };
         if let Some(scene) = &input.scene {
             let p = &input.camera.projection;
-            block.scene = Vec4::new(p.z_axis.z, p.w_axis.z / space.radius as f32, scene.cleared_depth, block.scene.w);
+            block.scene_z_scale = p.z_axis.z;
+            block.scene_z_offset = p.w_axis.z / space.radius as f32;
+            block.scene_cleared = scene.cleared_depth;
         }
         slot.frame_block.mapped()[..size_of_val(&block)].copy_from_slice(bytemuck::bytes_of(&block));
         // SAFETY: no set of this slot is in use (contract).

@@ -109,7 +109,7 @@ fn bind_step(
     let make = |(_, relation): &(usize, bool)| {
         Pipeline::compute(host, shader, &[u32::from(*relation)], size_of::<Prepare>() as u32)
     };
-    let pipeline = pipelines.get((i, prepare.source.w != 1), make)?;
+    let pipeline = pipelines.get((i, prepare.entries_per_particle != 1), make)?;
     r.bind(pipeline, uses)?;
     r.push(pipeline, prepare);
     Ok(())

@@ -40,7 +40,7 @@ impl Shape {
             uses.push(bound(10, Id::Neighbours, Access::ComputeWrite));
         }
         let host = r.host;
-        let key = [prepare.source.w != 1, kept, listed];
+        let key = [prepare.entries_per_particle != 1, kept, listed];
         let pipeline = self.pipelines.get(key, |[relation, kept, listed]| {
             let shader = if *listed { &SHAPE_NEIGHBOURS_COMP } else { &SHAPE_COMP };
             let constants = [u32::from(*relation), u32::from(*kept)];

@@ -31,7 +31,7 @@ impl Sort {
         let mut prepare = *prepare;
         r.pass("sort", &USES, |r| {
             for pass in 0..SORT_PASSES {
-                prepare.options.y = pass;
+                prepare.sort_pass = pass;
                 // How many of these passes the occupied cells need only the device knows: the others are empty.
                 let blocks = 4 * u64::from(EXTENT_DISPATCH + 6 * pass);
                 let steps = [(&SORT_COUNT_COMP, blocks), (&SORT_SCAN_COMP, blocks + 12), (&SORT_SCATTER_COMP, blocks)];

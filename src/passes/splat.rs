@@ -12,7 +12,6 @@ use crate::{
     targets::{Id, Needs},
 };
 use ash::vk;
-use glam::UVec4;
 
 pub(crate) struct SplatPass {
     /// By "quads".
@@ -57,7 +56,7 @@ impl SplatPass {
             (false, false) => ("body back", Id::BodyDepthRaw, Id::BodyNormalRaw),
         };
         let uses = uses(depth, normal);
-        let splat = Splat { what: UVec4::new(class, side, 0, 0) };
+        let splat = Splat { cls: class, side };
         // The depth test works on near / d: nearest is largest. Nothing there: 0 for fronts, 1 for backs.
         let (compare, clear) =
             if side == SIDE_FRONT { (vk::CompareOp::GREATER, 0.0) } else { (vk::CompareOp::LESS, 1.0) };

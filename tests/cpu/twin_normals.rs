@@ -43,7 +43,7 @@ fn a_tilted_plane_has_its_normal() {
 fn a_sphere_has_its_normals() {
     let frame = frame(SIZE, 0.3);
     let (center, radius) = (DVec3::new(0.1, -0.05, -2.0), 0.6);
-    let pixel = 2.0 / f64::from(frame.to_pixel.x);
+    let pixel = 2.0 / f64::from(frame.pixel_scale.x);
     for side in [SIDE_FRONT, SIDE_BACK] {
         let mut depth = Vec::new();
         for (y, x) in (0..SIZE[1] as i32).flat_map(|y| (0..SIZE[0] as i32).map(move |x| (y, x))) {

@@ -28,7 +28,7 @@ pub fn tilted(tilt_degrees: f64, azimuth_degrees: f64) -> (u32, DVec3) {
 /// Depth map of the plane with this normal through (0, 0, -`depth`), where `keep` says so and the ray meets it well
 /// before the horizon.
 pub fn plane(frame: &Frame, n: DVec3, depth: f64, keep: impl Fn(i32, i32) -> bool) -> Vec<f32> {
-    let (w, h) = (frame.viewport.x as i32, frame.viewport.y as i32);
+    let (w, h) = (frame.size.x as i32, frame.size.y as i32);
     let mut map = Vec::new();
     for y in 0..h {
         for x in 0..w {
@@ -43,7 +43,7 @@ pub fn plane(frame: &Frame, n: DVec3, depth: f64, keep: impl Fn(i32, i32) -> boo
 }
 
 fn flat(frame: &Frame, depth: f32) -> (Vec<f32>, Vec<u32>) {
-    let count = (frame.viewport.x * frame.viewport.y) as usize;
+    let count = (frame.size.x * frame.size.y) as usize;
     (vec![depth; count], vec![encode_normal(Vec3::Z); count])
 }
 
@@ -119,7 +119,7 @@ fn a_step_is_kept() {
 fn euclidean_weights_smooth_a_gap_that_depth_differences_keep() {
     let frame = frame(SIZE, 1.0);
     // A pixel is sigma wide; the centre is cut off from its own surface by a ring 1.5 sigma behind.
-    let pixel = frame.to_pixel.x;
+    let pixel = frame.pixel_scale.x;
     let (mut depth, normal) = flat(&frame, pixel);
     for y in 19..=21 {
         for x in 29..=31 {
@@ -204,7 +204,7 @@ fn guards_keep_the_depth_and_are_counted() {
     let fit = run(&tight, &depth, &codes);
     assert_eq!((fit.count(Outcome::Unbounded), &fit.depth), (2, &depth));
     let mut far = frame;
-    far.viewport.z = 0.999;
+    far.near = 0.999;
     let fit = run(&far, &depth, &codes);
     assert_eq!((fit.count(Outcome::Unbounded), fit.count(Outcome::Fitted)), (1, 1));
 }

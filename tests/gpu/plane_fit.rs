@@ -2,7 +2,9 @@
 
 use crate::support::{Case, Driver, Random, Shot, camera, each_driver, lattice, random_cloud, sphere};
 use glam::{Mat3, Vec3};
-use meniscus::shader::{COUNT_FIT_GRAZING, COUNT_FIT_UNBOUNDED, COUNT_FIT_ZERO_NORMAL};
+use meniscus::shader::{
+    COUNT_FIT_GRAZING, COUNT_FIT_UNBOUNDED, COUNT_FIT_ZERO_NORMAL, FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT,
+};
 use meniscus::twin::plane_fit::{LEAST_AGREEMENT, Outcome, Plane, plane_fit};
 use meniscus::{Camera, Ellipsoid, Particles, Settings, Weighting, targets::Id};
 
@@ -34,14 +36,15 @@ fn settings(window: u32, iterations: u32, sigma: f32, weighting: Weighting) -> S
 /// to the depth itself sideways; weights leave about sigma of rise) are rounded to a step or two of the largest; what
 /// it is divided by is n.v times the length of the sum of normals.
 fn rounding(shot: &Shot, own: f32, plane: &Plane) -> f64 {
-    let [own, sigma] = [own, shot.frame.smoothing.x].map(f64::from);
+    let [own, sigma] = [own, shot.frame.sigma].map(f64::from);
     let magnitude = own + (plane.depth - own).abs() + sigma;
     f64::from(f32::EPSILON) * magnitude * (0.5 + 2.0 / (plane.facing * plane.agreement))
 }
 
 /// Whether rounding decides if a guard fires.
 fn is_close(shot: &Shot, own: f32, plane: &Plane) -> bool {
-    let [limit, grazing, near] = [shot.frame.smoothing.y, shot.frame.smoothing.z, shot.frame.viewport.z].map(f64::from);
+    let limits = [FIT_UPDATE_LIMIT * shot.frame.sigma, FIT_GRAZING_LIMIT, shot.frame.near];
+    let [limit, grazing, near] = limits.map(f64::from);
     if (plane.agreement - LEAST_AGREEMENT).abs() < 5e-7 {
         return true;
     }
