@@ -16,7 +16,7 @@ layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2DArray normal_out;
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 
 float depth_at(ivec2 p, int layer) {
-    if (any(lessThan(p, ivec2(0))) || any(greaterThanEqual(p, ivec2(frame.viewport.xy)))) return 0.0;
+    if (any(lessThan(p, ivec2(0))) || any(greaterThanEqual(p, ivec2(frame.size)))) return 0.0;
     return texelFetch(depth_in, ivec3(p, layer), 0).x;
 }
 
@@ -25,15 +25,15 @@ vec3 tangent(ivec2 pixel, ivec2 step, int layer, float d, vec3 v) {
     float before = depth_at(pixel - step, layer), after = depth_at(pixel + step, layer);
     bool forward = after > 0.0 && (before <= 0.0 || abs(after - d) <= abs(before - d));
     if (!forward && before <= 0.0) return vec3(0.0);
-    float other = forward ? after : before, sign = forward ? 1.0 : -1.0;
-    // other (v +- step) - d v, without the cancellation
-    return sign * ((other - d) * v) + vec3(other * vec2(step) / frame.to_pixel.xy, 0.0);
+    float neighbour = forward ? after : before, sign = forward ? 1.0 : -1.0;
+    // neighbour (v +- step) - d v, without the cancellation
+    return sign * ((neighbour - d) * v) + vec3(neighbour * vec2(step) / frame.pixel_scale, 0.0);
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     int layer = int(gl_WorkGroupID.z);
-    if (any(greaterThanEqual(pixel, ivec2(frame.viewport.xy)))) return;
+    if (any(greaterThanEqual(pixel, ivec2(frame.size)))) return;
     float d = depth_at(pixel, layer);
     uint result = 0u;
     if (d > 0.0) {

@@ -14,7 +14,7 @@ void main() {
     vec3 q;
     float a, b, discriminant = quadratic(Cast(center, g_diagonal, g_mixed), v, q, a, b);
     if (discriminant < 0.0) discard;
-    float root = sqrt(discriminant), near = frame.viewport.z;
+    float root = sqrt(discriminant), near = frame.near;
     float front = center.z + (-root - b) / a, back = center.z + (root - b) / a;
     if (back < near) discard;
     // Nothing can be in front of a particle in which the ray starts.

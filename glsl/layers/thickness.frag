@@ -21,10 +21,10 @@ void main() {
     float a, b, discriminant = quadratic(Cast(center, g_diagonal, g_mixed), v, q, a, b);
     if (discriminant < 0.0) discard;
     float root = sqrt(discriminant);
-    float front = max(center.z + (-root - b) / a, frame.viewport.z), back = center.z + (root - b) / a;
+    float front = max(center.z + (-root - b) / a, frame.near), back = center.z + (root - b) / a;
 #ifdef SCENE
     float z = texelFetch(scene_depth, ivec2(gl_FragCoord.xy), 0).x;
-    if (z != frame.scene.z) back = min(back, frame.scene.y / (z + frame.scene.x));
+    if (z != frame.scene_cleared) back = min(back, frame.scene_z_offset / (z + frame.scene_z_scale));
 #endif
     if (back <= front) discard;
     out_length = (back - front) * length(v);

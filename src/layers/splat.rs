@@ -9,7 +9,6 @@ use crate::{
     shader::{self, CLASS_BODY, CLASS_SPLASH, SIDE_BACK, SIDE_FRONT, Shader, Splat},
 };
 use ash::vk::{CompareOp, Format, PrimitiveTopology};
-use glam::UVec4;
 
 /// Draws of one class as it shows on one side: as points, and as quads where those are too small. One of the two draws
 /// nothing: the compact pass chose.
@@ -28,7 +27,7 @@ pub(super) fn particles(
             .read("diagonals", drawn.particles.diagonals)
             .read("mixed", drawn.particles.mixed)
             .read("drawn", drawn.lists)
-            .push_all(&Splat { what: UVec4::new(class, side, 0, 0) });
+            .push_all(&Splat { cls: class, side });
         let half = size_of::<shader::Draws>() as u64 / 2;
         let offset = u64::from(2 * class + side) * 2 * half + if quads { half } else { 0 };
         (call, Vertices::Indirect(drawn.draws, offset))

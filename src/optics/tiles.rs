@@ -16,7 +16,7 @@ pub(super) fn record(plan: &mut Plan, surfaces: &Surfaces, body: &Surface, splas
     let call = Call::compute(&TILES_COMP)
         .read("body_depth", body.depth)
         .read("splash_depth", splash.depth)
-        .write("range_out", ranges)
+        .write("front_tiles", ranges)
         .constant("HAS_SPLASH", surfaces.splash.is_some())
         .constant("HAS_BODY", surfaces.body.is_some());
     plan.dispatch("tiles", call, Groups::Direct([size[0], size[1], 1]));

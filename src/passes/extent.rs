@@ -23,7 +23,7 @@ pub(crate) fn record(plan: &mut Plan, scene: &Scene, prepare: &Prepare) -> Targe
             .read("positions", positions)
             .update("extent", extent)
             .update("counters", counters)
-            .constant("RELATION", prepare.source.w != 1)
+            .constant("RELATION_TABLE", prepare.entries_per_particle != 1)
             .push_all(prepare);
         plan.dispatch("extent", call, groups);
     }

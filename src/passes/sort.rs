@@ -26,10 +26,10 @@ pub(crate) fn record(plan: &mut Plan, scene: &Scene, preparation: &Preparation, 
     let mut prepare = preparation.constants;
     let step = |shader: &'static Shader, prepare: &Prepare| {
         let call = Call::compute(shader).read("positions", positions).read("extent", extent);
-        call.constant("RELATION", preparation.constants.source.w != 1).push_all(prepare)
+        call.constant("RELATION_TABLE", preparation.constants.entries_per_particle != 1).push_all(prepare)
     };
     for pass in 0..SORT_PASSES {
-        prepare.options.y = pass;
+        prepare.sort_pass = pass;
         // How many of these passes the occupied cells need only the device knows: the others are empty.
         let (blocks, rows) = (4 * u64::from(EXTENT_DISPATCH + 6 * pass), 4 * u64::from(EXTENT_DISPATCH + 6 * pass + 3));
         let count = step(&SORT_COUNT_COMP, &prepare).read("order", order).update("sums", sums);

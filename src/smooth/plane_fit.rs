@@ -69,8 +69,9 @@ impl Filter for PlaneFit {
                 .update("counters", counters)
                 .constant("local_size_x", edge)
                 .constant("local_size_y", edge)
-                .constant("REACH", reach)
-                .constant("EUCLIDEAN", self.weighting == Weighting::Euclidean);
+                .constant("HALF_WINDOW", reach)
+                .constant("EUCLIDEAN", self.weighting == Weighting::Euclidean)
+                .push("sigma", self.sigma);
             let groups = per_pixel(plan, edge, body.sides);
             plan.dispatch("plane fit", call, groups);
             from = to;

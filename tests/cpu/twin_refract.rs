@@ -1,6 +1,6 @@
 //! The twin of the refraction pass on maps made here: spheres ray-cast in the test, against closed forms.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use meniscus::{
     Camera, Equirect, Settings,
     inspect::{Walk as Rays, uniforms},
@@ -31,9 +31,8 @@ fn frame(settings: &Settings, bounds: (Vec3, Vec3)) -> Frame {
 }
 
 fn view_ray(frame: &Frame, pixel: usize) -> DVec3 {
-    let [ax, ay, bx, by] = frame.to_pixel.to_array().map(f64::from);
-    let (x, y) = (pixel % SIZE[0] as usize, pixel / SIZE[0] as usize);
-    DVec3::new((x as f64 + 0.5 - bx) / ax, (y as f64 + 0.5 - by) / ay, -1.0)
+    let pixel = DVec2::new((pixel % SIZE[0] as usize) as f64, (pixel / SIZE[0] as usize) as f64) + 0.5;
+    ((pixel - frame.pixel_origin.as_dvec2()) / frame.pixel_scale.as_dvec2()).extend(-1.0)
 }
 
 /// Both crossings of a ray with a sphere.

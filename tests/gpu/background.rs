@@ -12,7 +12,7 @@ use glam::{DVec3, Mat3, Vec3};
 use meniscus::{
     Background, Camera, Ellipsoid, EnvironmentInput, EnvironmentShape, Equirect, FrameInput, SceneInput, Settings,
     host::{Canvas, Gpu},
-    shader::{OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_SCENE, WETTED},
+    shader::{OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_SCENE, WETTING_GAP},
     twin::{background::env_color, optics::fresnel},
 };
 
@@ -114,7 +114,7 @@ fn a_plane_in_and_behind_a_slab_is_met_where_the_closed_form_says() {
                 let far = q.crossings(x, bent).expect("a ray inside leaves").1;
                 let (to_plane, wall) = (hit(x, bent), q.normal(x + far * bent));
                 let gap = (to_plane - far) * bent.dot(wall);
-                let limit = f64::from(WETTED * RADIUS);
+                let limit = f64::from(WETTING_GAP * RADIUS);
                 // A ray that ends close to where the rule changes may go either way.
                 if refractions > 1 && ((gap - limit).abs() < 0.1 * limit || (to_plane - far).abs() < 1e-3) {
                     continue;

@@ -2,7 +2,9 @@
 
 use crate::support::{Choose, Case, Driver, Random, Shot, camera, each_driver, lattice, random_cloud, sphere};
 use glam::{Mat3, Vec3};
-use meniscus::shader::{COUNT_FIT_GRAZING, COUNT_FIT_UNBOUNDED, COUNT_FIT_ZERO_NORMAL};
+use meniscus::shader::{
+    COUNT_FIT_GRAZING, COUNT_FIT_UNBOUNDED, COUNT_FIT_ZERO_NORMAL, FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT,
+};
 use meniscus::twin::plane_fit::{LEAST_AGREEMENT, Outcome, Plane, plane_fit};
 use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
 use meniscus::{Camera, Ellipsoid, Particles, Settings};
@@ -39,15 +41,16 @@ fn settings(window: u32, iterations: u32, sigma: f32, weighting: Weighting) -> S
 /// Error of eq. (5) in 32 bits. Storage rounds by half a step of the depth. The fraction is one of sums whose terms (up
 /// to the depth itself sideways; weights leave about sigma of rise) are rounded to a step or two of the largest; what
 /// it is divided by is n.v times the length of the sum of normals.
-fn rounding(shot: &Shot, own: f32, plane: &Plane) -> f64 {
-    let [own, sigma] = [own, shot.frame.smoothing.x].map(f64::from);
+fn rounding(fit: &PlaneFit, own: f32, plane: &Plane) -> f64 {
+    let [own, sigma] = [own, fit.sigma].map(f64::from);
     let magnitude = own + (plane.depth - own).abs() + sigma;
     f64::from(f32::EPSILON) * magnitude * (0.5 + 2.0 / (plane.facing * plane.agreement))
 }
 
 /// Whether rounding decides if a guard fires.
-fn is_close(shot: &Shot, own: f32, plane: &Plane) -> bool {
-    let [limit, grazing, near] = [shot.frame.smoothing.y, shot.frame.smoothing.z, shot.frame.viewport.z].map(f64::from);
+fn is_close(fit: &PlaneFit, shot: &Shot, own: f32, plane: &Plane) -> bool {
+    let limits = [FIT_UPDATE_LIMIT * fit.sigma, FIT_GRAZING_LIMIT, shot.frame.near];
+    let [limit, grazing, near] = limits.map(f64::from);
     if (plane.agreement - LEAST_AGREEMENT).abs() < 5e-7 {
         return true;
     }
@@ -57,7 +60,7 @@ fn is_close(shot: &Shot, own: f32, plane: &Plane) -> bool {
     if (plane.facing - grazing).abs() < 1e-6 / plane.agreement {
         return true;
     }
-    let slack = rounding(shot, own, plane);
+    let slack = rounding(fit, own, plane);
     let update = (plane.depth - f64::from(own)).abs();
     plane.facing > grazing && ((update - limit).abs() < slack || (plane.depth - near).abs() < slack)
 }
@@ -70,7 +73,7 @@ fn compare(label: &str, settings: &PlaneFit, from: (&Shot, &'static str), to: (&
         let input = from.0.floats(from.1, layer).expect("input");
         let output = to.0.floats(to.1, layer).expect("output");
         let normal = shot.words("body normal (ray-cast)", layer).expect("normals");
-        let fit = plane_fit(&shot.frame, &input, normal, settings.window, settings.weighting);
+        let fit = plane_fit(&shot.frame, &input, normal, settings);
         for (i, plane) in fit.plane.iter().enumerate() {
             let at =
                 || format!("{label}, layer {layer}, pixel {}, {}", i as u32 % shot.size[0], i as u32 / shot.size[0]);
@@ -83,7 +86,7 @@ fn compare(label: &str, settings: &PlaneFit, from: (&Shot, &'static str), to: (&
             for (count, (guard, _)) in seen.guards.iter_mut().zip(GUARDS) {
                 *count += u32::from(outcome == guard);
             }
-            let undecided = is_close(shot, input[i], plane);
+            let undecided = is_close(settings, shot, input[i], plane);
             seen.close += u32::from(undecided);
             if kept && (undecided || outcome != Outcome::Fitted) {
                 continue;
@@ -96,7 +99,7 @@ fn compare(label: &str, settings: &PlaneFit, from: (&Shot, &'static str), to: (&
                 input[i],
                 output[i]
             );
-            let (error, tolerance) = ((f64::from(output[i]) - plane.depth).abs(), rounding(shot, input[i], plane));
+            let (error, tolerance) = ((f64::from(output[i]) - plane.depth).abs(), rounding(settings, input[i], plane));
             assert!(error <= tolerance, "{}: {} for {plane:?}, from {}", at(), output[i], input[i]);
             seen.fitted += 1;
             seen.worst = seen.worst.max(error / tolerance);

@@ -95,7 +95,7 @@ fn check_layer(
     tolerance: Tolerance,
     label: &str,
 ) {
-    let near = f64::from(shot.frame.viewport.z);
+    let near = f64::from(shot.frame.near);
     let (mut covered, mut outlines, mut far, mut tilted) = (0usize, 0usize, 0usize, 0usize);
     let (mut sum, mut most, mut turn) = (0.0f64, 0.0f64, 0.0f64);
     for (pixel, ((want, got), normal)) in layer.iter().zip(depth).zip(normal).enumerate() {
@@ -257,7 +257,7 @@ fn particles_at_the_near_plane_match_the_twin() {
     around.particles.ellipsoids.push(Ellipsoid { center: Vec3::new(0.05, 0.0, 0.1), ..sphere(Vec3::ZERO, 1.0) });
     each_driver(|driver| {
         let shot = check(driver, &crossing, "near plane", tolerance(30.0));
-        let near = shot.frame.viewport.z;
+        let near = shot.frame.near;
         let front = shot.floats("body depth (ray-cast)", 0).unwrap();
         let inside = front.iter().filter(|d| **d == -near).count();
         assert!(inside > 200 && front.iter().filter(|d| **d > 0.0).count() > 1000, "{}: {inside}", driver.name);

@@ -119,9 +119,9 @@ impl<'a> Driver<'a> {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
         let mut shot = self.shoot_input(case, &|input| input.scene(scene).background(background));
         let p = case.camera.projection;
-        shot.frame.scene.x = p.z_axis.z;
-        shot.frame.scene.y = p.w_axis.z / shot.space.radius as f32;
-        shot.frame.scene.z = scene.cleared_depth;
+        shot.frame.scene_z_scale = p.z_axis.z;
+        shot.frame.scene_z_offset = p.w_axis.z / shot.space.radius as f32;
+        shot.frame.scene_cleared = scene.cleared_depth;
         shot
     }
 
@@ -151,7 +151,7 @@ impl<'a> Driver<'a> {
             None => Space::of(&case.particles),
         };
         let mut frame = inspect::uniforms(&case.camera, &case.settings, case.size, &space, bounds);
-        frame.scene.w = f32::from(case.eye_inside);
+        frame.eye_inside = f32::from(case.eye_inside);
         Shot { frame, space, size: case.size, picture, targets }
     }
 }

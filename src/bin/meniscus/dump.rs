@@ -144,7 +144,8 @@ pub fn frame(job: &Job) -> serde_json::Value {
         |table: &[(u32, &'static str)]| table.iter().map(|(c, t)| (c.to_string(), *t)).collect::<BTreeMap<_, _>>();
     let bounds = job.scene.particles.bounds().unwrap_or_default();
     // In radii, whatever the origin.
-    let search = radius * job.camera.uniforms(s, job.size, &Space::new(radius, Vec3::ZERO), bounds).search;
+    let frame = job.camera.uniforms(s, job.size, &Space::new(radius, Vec3::ZERO), bounds);
+    let tolerance = meniscus::twin::search::Tolerance::of(&frame);
     json!({
         "width": job.size[0],
         "height": job.size[1],
@@ -170,8 +171,8 @@ pub fn frame(job: &Job) -> serde_json::Value {
         "ior": s.ior,
         "absorption": s.absorption.to_array(),
         "sampling": {
-            "jump": search.z,
-            "accepted": search.y,
+            "jump": radius * tolerance.jump,
+            "accepted": radius * tolerance.accepted,
             "meaning": "maps are sampled bilinearly, normals with them, where all four pixels have a surface whose depths \
                         spread by at most `jump`, else at the nearest pixel; a hit has |f| of at most `accepted`",
         },
