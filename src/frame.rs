@@ -43,6 +43,10 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
         surfaces = method.layers.member().record(&mut plan, scene, &drawn);
         surfaces.body = surfaces.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
     }
+    #[cfg(feature = "inspect")]
+    {
+        plan.surfaces = crate::inspect::SurfaceNames::new(&plan, &surfaces);
+    }
     plan.work_for(Home::View);
     // Light through them (Imai16 §4.4, §4.5). Without liquid the host's picture stays.
     if scene.count > 0 || scene.walks || scene.background == Background::Environment {

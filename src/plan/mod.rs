@@ -65,6 +65,9 @@ pub(crate) struct Plan {
     pub size: [u32; 2],
     pub resources: Vec<Declared>,
     pub steps: Vec<Step>,
+    /// Where the surfaces are that light meets.
+    #[cfg(feature = "inspect")]
+    pub surfaces: crate::inspect::SurfaceNames,
     home: Home,
     /// What a pass got wrong first.
     wrong: Option<Error>,
@@ -73,7 +76,15 @@ pub(crate) struct Plan {
 impl Plan {
     /// An empty frame of so many pixels.
     pub fn new(size: [u32; 2]) -> Plan {
-        Plan { size, resources: Vec::new(), steps: Vec::new(), home: Home::Particles, wrong: None }
+        Plan {
+            size,
+            resources: Vec::new(),
+            steps: Vec::new(),
+            #[cfg(feature = "inspect")]
+            surfaces: Default::default(),
+            home: Home::Particles,
+            wrong: None,
+        }
     }
 
     /// Says what the passes that follow work for.
