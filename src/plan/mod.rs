@@ -69,6 +69,7 @@ pub(crate) struct Plan {
     #[cfg(feature = "inspect")]
     pub surfaces: crate::inspect::SurfaceNames,
     home: Home,
+    part: &'static str,
     /// What a pass got wrong first.
     wrong: Option<Error>,
 }
@@ -83,13 +84,14 @@ impl Plan {
             #[cfg(feature = "inspect")]
             surfaces: Default::default(),
             home: Home::Particles,
+            part: "",
             wrong: None,
         }
     }
 
-    /// Says what the passes that follow work for.
-    pub fn work_for(&mut self, home: Home) {
-        self.home = home;
+    /// Says what the passes that follow work for, and as what part of the frame.
+    pub fn work_for(&mut self, home: Home, part: &'static str) {
+        (self.home, self.part) = (home, part);
     }
 
     /// The plan, unless a pass declared something that cannot be.
