@@ -20,11 +20,11 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
     let method = &scene.settings.method;
     let mut surfaces = Surfaces::default();
     if scene.count > 0 {
-        plan.work_for(Home::View);
+        plan.work_for(Home::View, "visibility");
         let counters = counters(&mut plan);
         plan.fill("reset", counters, 0, vk::WHOLE_SIZE, 0);
 
-        plan.work_for(Home::Particles);
+        plan.work_for(Home::Particles, "particles");
         let particles = match &scene.prepare {
             // From positions on the device: their box, their neighbours (Im16 §III), classes and ellipsoids (YuTurk13).
             Some(p) => {
@@ -35,17 +35,23 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
             None => Arrays::given(&mut plan),
         };
 
-        plan.work_for(Home::View);
+        plan.work_for(Home::View, "visibility");
         // Which particles can show at all.
         let bounds = scene.occlusion().then(|| occlude::record(&mut plan, scene, &particles));
         let visible = cull::record(&mut plan, scene, &particles, bounds);
         let drawn = compact::record(&mut plan, scene, &particles, visible);
         // The liquid's surfaces (Imai16 §4.2), the body's smoothed (Imai16 §4.3).
+        plan.work_for(Home::View, "layers");
         let layered = method.layers.member().record(&mut plan, scene, &drawn);
+        plan.work_for(Home::View, "smooth");
         surfaces.body = layered.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
         (surfaces.splash, surfaces.thickness) = (layered.splash, layered.thickness);
     }
-    plan.work_for(Home::View);
+    #[cfg(feature = "inspect")]
+    {
+        plan.surfaces = crate::inspect::SurfaceNames::new(&plan, &surfaces);
+    }
+    plan.work_for(Home::View, "optics");
     // Light through them (Imai16 §4.4, §4.5). Without liquid the host's picture stays.
     if scene.count > 0 || scene.walks || scene.background == Background::Environment {
         method.optics.member().record(&mut plan, scene, &surfaces);

@@ -1,18 +1,14 @@
 //! What a frame left behind, for tests, dumps and studies of the method: targets by name, and what walks met. No host needs
 //! it to draw; the feature `inspect` brings it, with the CPU twins and the tables of shaders.
 
+use crate::{
+    Camera, Error, Renderer, Settings, frame::Scene, layers::Surfaces, plan::Plan, recorder::PlanEntry,
+    resources::Resource, shader::Frame, space::Space,
+};
 pub use crate::{
     access::{Access, Barrier, State},
     optics::walk::Walk,
     resources::{ImageSpec, Spec},
-};
-use crate::{
-    Camera, Error, Renderer, Settings,
-    frame::Scene,
-    recorder::PlanEntry,
-    resources::Resource,
-    shader::Frame,
-    space::Space,
 };
 use ash::vk;
 use glam::Vec3;
@@ -36,14 +32,34 @@ impl Inspection {
     }
 }
 
+/// Targets that hold the liquid's surfaces as light meets them: the body's after smoothing. `None` where the frame has none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SurfaceNames {
+    /// Depths of the splashes.
+    pub splash_depth: Option<&'static str>,
+    /// Normals of the splashes.
+    pub splash_normal: Option<&'static str>,
+    /// Depths of the body.
+    pub body_depth: Option<&'static str>,
+    /// Normals of the body.
+    pub body_normal: Option<&'static str>,
+}
+
+impl SurfaceNames {
+    pub(crate) fn new(plan: &Plan, surfaces: &Surfaces) -> SurfaceNames {
+        let name = |target| plan.resource(target).name;
+        SurfaceNames {
+            splash_depth: surfaces.splash.map(|s| name(s.depth)),
+            splash_normal: surfaces.splash.map(|s| name(s.normal)),
+            body_depth: surfaces.body.map(|s| name(s.depth)),
+            body_normal: surfaces.body.map(|s| name(s.normal)),
+        }
+    }
+}
+
 /// The block that shaders read; see [`Camera`].
-pub fn uniforms(
-    camera: &Camera,
-    settings: &Settings,
-    size: [u32; 2],
-    space: &Space,
-    bounds: (Vec3, Vec3),
-) -> Frame {
+pub fn uniforms(camera: &Camera, settings: &Settings, size: [u32; 2], space: &Space, bounds: (Vec3, Vec3)) -> Frame {
     camera.uniforms(settings, size, space, bounds)
 }
 
@@ -51,6 +67,11 @@ impl Renderer {
     /// Says what frames to come write beside the picture.
     pub fn inspect(&mut self, inspection: Inspection) {
         self.inspection = inspection;
+    }
+
+    /// Which targets hold the surfaces of the last frame.
+    pub fn surfaces(&self) -> SurfaceNames {
+        self.surfaces
     }
 
     /// Names of the targets and buffers of the last frame.

@@ -1,6 +1,6 @@
 //! How a liquid is drawn: one member of each family, and which go together.
 
-use crate::{Error, layers::Layers, optics::Optics, smooth::Smooth};
+use crate::{Error, layers::Layers, optics::Optics, parameters::Part, smooth::Smooth};
 
 /// Layers of surfaces, their smoothing, and the optics between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,6 +66,32 @@ impl Method {
             }
         }
         Ok(())
+    }
+
+    /// The families, by the names of their fields.
+    pub fn families() -> Vec<Part> {
+        vec![Layers::part("layers"), Smooth::part("smooth"), Optics::part("optics")]
+    }
+
+    /// Which member of each family this is: names of the families and of the members.
+    pub fn members(&self) -> [(&'static str, &'static str); 3] {
+        [("layers", self.layers.name()), ("smooth", self.smooth.name()), ("optics", self.optics.name())]
+    }
+
+    /// Takes another member of a family, with its default parameters; the one that is there already stays as it is.
+    pub fn choose(&mut self, family: &str, member: &str) -> Result<(), Error> {
+        if self.members().contains(&(family, member)) {
+            return Ok(());
+        }
+        let known = match family {
+            "layers" => Layers::named(member).map(|m| self.layers = m).ok_or(Layers::NAMES),
+            "smooth" => Smooth::named(member).map(|m| self.smooth = m).ok_or(Smooth::NAMES),
+            "optics" => Optics::named(member).map(|m| self.optics = m).ok_or(Optics::NAMES),
+            _ => return Err(Error::parameter("family", family, "there are layers, smooth and optics")),
+        };
+        known.map_err(|names| {
+            Error::parameter("member of a family", member, format!("{family} has {}", names.join(", ")))
+        })
     }
 
     /// The published method of this name.

@@ -12,7 +12,8 @@ pub struct Parameter {
     pub name: &'static str,
     /// What it is.
     pub doc: &'static str,
-    /// Unit; empty where it has none.
+    /// Unit; empty where it has none. "pixels" is the edge of a window of the picture's pixels: who renders at a multiple of
+    /// the picture's size widens it.
     pub unit: &'static str,
     /// What it must be, as in "use …".
     pub range: &'static str,
@@ -26,6 +27,8 @@ pub struct Parameter {
 
 /// A group of parameters.
 pub trait Parameters {
+    /// What they are of.
+    fn about(&self) -> &'static str;
     /// Every parameter, in order.
     fn parameters(&self) -> Vec<Parameter>;
     /// Sets one by name, from text; [`Parameters::validate`] checks ranges.
@@ -101,11 +104,11 @@ pub(crate) use choices;
 
 /// A struct of parameters: for each its documentation, type and default, then unit, what it must be, and a check of that.
 macro_rules! parameters {
-    ($(#[$meta:meta])* pub struct $Name:ident { $(
+    ($(#[doc = $about:literal])+ pub struct $Name:ident { $(
         $(#[doc = $doc:literal])+
         $field:ident: $Type:ty = $default:expr, $unit:literal, $range:literal => $check:expr;
     )* }) => {
-        $(#[$meta])*
+        $(#[doc = $about])+
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
@@ -133,6 +136,10 @@ macro_rules! parameters {
 
         #[allow(unused_variables)]
         impl $crate::parameters::Parameters for $Name {
+            fn about(&self) -> &'static str {
+                concat!($($about,)+).trim_ascii()
+            }
+
             fn parameters(&self) -> Vec<$crate::parameters::Parameter> {
                 #[allow(unused_imports)]
                 use $crate::parameters::Value;
@@ -185,10 +192,22 @@ pub(crate) fn unknown(name: &str, known: &[Parameter]) -> Error {
     Error::parameter("parameter", name, there)
 }
 
+/// What settings consist of, as it can be chosen and set; see [`crate::Settings::parts`].
+#[non_exhaustive]
+pub struct Part {
+    /// Name in files and on the command line.
+    pub name: &'static str,
+    /// What it decides; empty if its one member says so.
+    pub about: &'static str,
+    /// The members of a family, by name and with their default parameters; or one without a name, where there is nothing to
+    /// choose.
+    pub members: Vec<(&'static str, Box<dyn Parameters>)>,
+}
+
 /// A family of methods that do the same work: one enum, each member with parameters of its own in a module of its own.
 macro_rules! family {
-    ($(#[$meta:meta])* pub enum $Family:ident: $Trait:ident { $($Member:ident($module:ident) = $name:literal,)* }) => {
-        $(#[$meta])*
+    ($(#[doc = $about:literal])+ pub enum $Family:ident: $Trait:ident { $($Member:ident($module:ident) = $name:literal,)* }) => {
+        $(#[doc = $about])+
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(tag = "name"))]
         #[non_exhaustive]
@@ -201,6 +220,12 @@ macro_rules! family {
         impl $Family {
             /// Names of the members.
             pub const NAMES: &'static [&'static str] = &[$($name),*];
+
+            /// The family as a part of settings, by the name it has there.
+            pub(crate) fn part(name: &'static str) -> $crate::parameters::Part {
+                let about = concat!($($about,)+).trim_ascii();
+                $crate::parameters::Part { name, about, members: vec![$(($name, Box::new(<$module::$Member>::default()))),*] }
+            }
 
             /// Each member with its default parameters.
             pub fn all() -> Vec<$Family> {

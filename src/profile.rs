@@ -1,6 +1,6 @@
 //! GPU time of each pass: one scope a pass, a pair of timestamps each, read without waiting.
 
-use crate::{Error, device::Host, plan::Home};
+use crate::{Error, device::Host, plan::{Home, Step}};
 use ash::vk;
 
 /// GPU time of one pass in milliseconds.
@@ -12,6 +12,9 @@ pub struct PassTime {
     pub ms: f64,
     /// Whether it works for the particles, whatever the view: prepares them.
     pub prepares: bool,
+    /// What part of the frame it is: "particles", "visibility" (which of them can show), or the family whose member it
+    /// belongs to.
+    pub part: &'static str,
 }
 
 /// GPU times of one frame.
@@ -27,7 +30,7 @@ pub(crate) struct Profiler {
     pool: vk::QueryPool,
     /// Scopes that there is room for.
     room: u32,
-    names: Vec<(&'static str, Home)>,
+    names: Vec<(&'static str, Home, &'static str)>,
     period_ns: f64,
     mask: u64,
 }
@@ -67,8 +70,8 @@ impl Profiler {
         self.names.clear();
     }
 
-    pub fn begin(&mut self, device: &ash::Device, cmd: vk::CommandBuffer, name: &'static str, home: Home) {
-        self.names.push((name, home));
+    pub fn begin(&mut self, device: &ash::Device, cmd: vk::CommandBuffer, step: &Step) {
+        self.names.push((step.pass, step.home, step.part));
         self.stamp(device, cmd, 2 * (self.names.len() as u32 - 1));
     }
 
@@ -94,10 +97,11 @@ impl Profiler {
             .names
             .iter()
             .zip(ticks.chunks(2))
-            .map(|((name, home), t)| PassTime {
+            .map(|((name, home, part), t)| PassTime {
                 name: (*name).to_owned(),
                 ms: ms(t[0], t[1]),
                 prepares: *home == Home::Particles,
+                part,
             })
             .collect();
         Some(FrameTimes { passes, span_ms: ms(ticks[0], ticks[ticks.len() - 1]) })

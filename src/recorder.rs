@@ -75,7 +75,7 @@ impl Recorder<'_> {
                 };
             }
             if let Some(p) = &mut self.profiler {
-                p.begin(&self.host.device, self.cmd, name, pass[0].home);
+                p.begin(&self.host.device, self.cmd, &pass[0]);
             }
             let recorded = pass.iter().try_for_each(|step| self.step(step));
             if let Some(p) = &mut self.profiler {

@@ -47,6 +47,9 @@ pub struct Renderer {
     /// What is also written, for dumps and statistics.
     #[cfg(feature = "inspect")]
     pub(crate) inspection: crate::inspect::Inspection,
+    /// Where the last frame's surfaces are.
+    #[cfg(feature = "inspect")]
+    pub(crate) surfaces: crate::inspect::SurfaceNames,
     /// Whether the last frame left classes.
     last_classes: bool,
 }
@@ -114,6 +117,8 @@ impl Renderer {
             barriers: Vec::new(),
             #[cfg(feature = "inspect")]
             inspection: Default::default(),
+            #[cfg(feature = "inspect")]
+            surfaces: Default::default(),
             last_classes: false,
         };
         for _ in 0..renderer.host.frames_in_flight {
@@ -333,6 +338,10 @@ impl Renderer {
             table.discard_contents();
         }
         self.last_classes = keeps_classes;
+        #[cfg(feature = "inspect")]
+        {
+            self.surfaces = plan.surfaces;
+        }
 
         block.count = scene.count;
         block.largest_point = self.limits.point_size as u32;

@@ -2,7 +2,7 @@
 
 use crate::{
     Error, Method,
-    parameters::{Parameter, Parameters, parameters},
+    parameters::{Parameter, Parameters, Part, parameters},
     shader::Frame,
     space::Space,
 };
@@ -56,6 +56,15 @@ impl Settings {
         [m.layers.parameters(), m.smooth.parameters(), m.optics.parameters(), &self.liquid, &self.drawing]
     }
 
+    /// What settings consist of: all there is to choose and to set.
+    pub fn parts() -> Vec<Part> {
+        let group = |name, one: Box<dyn Parameters>| Part { name, about: "", members: vec![("", one)] };
+        let mut parts = Method::families();
+        parts.push(group("liquid", Box::new(Liquid::default())));
+        parts.push(group("drawing", Box::new(Drawing::default())));
+        parts
+    }
+
     /// Every parameter that these settings have.
     pub fn parameters(&self) -> Vec<Parameter> {
         self.groups().iter().flat_map(|g| g.parameters()).collect()
@@ -97,6 +106,9 @@ pub struct Camera {
     pub near: f32,
     /// World direction in which the environment's +y points, after the shortest turn that brings one to the other.
     pub up: Vec3,
+    /// Angle by which the environment is turned around `up`, in radians: counter-clockwise as seen from above, so that what
+    /// was in the middle of an equirectangular map (+x) turns towards -z.
+    pub environment_rotation: f32,
 }
 
 impl Camera {
@@ -107,7 +119,7 @@ impl Camera {
         let projection = rh::proj::vulkan::perspective_infinite(fov_y, aspect, near);
         // In double precision: squares of lengths may not be float32 numbers.
         let ahead = (target.as_dvec3() - eye.as_dvec3()).normalize().as_vec3();
-        Camera { view: rh::view::look_to_mat4(eye, ahead, up), projection, near, up }
+        Camera { view: rh::view::look_to_mat4(eye, ahead, up), projection, near, up, environment_rotation: 0.0 }
     }
 
     /// Checks that this is a rigid view and a perspective projection.
@@ -141,6 +153,9 @@ impl Camera {
         if !(self.up.is_finite() && self.up != Vec3::ZERO) {
             return Err(Error::parameter("up", self.up, "use a finite direction that is not zero"));
         }
+        if !self.environment_rotation.is_finite() {
+            return Err(Error::parameter("environment rotation", self.environment_rotation, "use a finite angle"));
+        }
         Ok(())
     }
 
@@ -153,9 +168,12 @@ impl Camera {
         let (w, h) = (size[0] as f32, size[1] as f32);
         let p = &self.projection;
         let to_up = Mat3::from_quat(glam::Quat::from_rotation_arc(self.up.as_dvec3().normalize().as_vec3(), Vec3::Y));
+        // Where the map is turned one way, directions are looked up turned the other. Whole turns in double precision.
+        let turn = f64::from(self.environment_rotation) % std::f64::consts::TAU;
+        let to_env = Mat3::from_rotation_y(-turn as f32) * to_up;
         Frame {
             view,
-            eye_to_env: Mat4::from_mat3(to_up * Mat3::from_mat4(self.view).transpose()),
+            eye_to_env: Mat4::from_mat3(to_env * Mat3::from_mat4(self.view).transpose()),
             // pixel = (ndc + 1) / 2 * size and ndc = P v - P02 for v = (x/d, y/d, -1)
             pixel_scale: Vec2::new(p.x_axis.x * 0.5 * w, p.y_axis.y * 0.5 * h),
             pixel_origin: Vec2::new((1.0 - p.z_axis.x) * 0.5 * w, (1.0 - p.z_axis.y) * 0.5 * h),

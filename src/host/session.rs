@@ -1,11 +1,7 @@
 //! One renderer on one device: frames in, targets out.
 
 use super::{Canvas, Gpu, HostError};
-use crate::{
-    Equirect, FrameInput, Renderer,
-    inspect::Spec,
-    profile::FrameTimes,
-};
+use crate::{Equirect, FrameInput, Renderer, inspect::Spec, profile::FrameTimes};
 use ash::vk;
 
 /// Output format: linear float, so that one frame serves pictures, dumps and downsampling.
@@ -82,7 +78,8 @@ impl<'a> Session<'a> {
         };
         let renderer = &mut self.renderer;
         // SAFETY: recorded outside rendering after the frame; the buffer has room for the whole layer.
-        let data = self.gpu.read_back(bytes, |cmd, to| Ok(unsafe { renderer.record_copy(cmd, name, layer, to, 0) }?))?;
+        let data =
+            self.gpu.read_back(bytes, |cmd, to| Ok(unsafe { renderer.record_copy(cmd, name, layer, to, 0) }?))?;
         Ok(Some(data.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect()))
     }
 

@@ -65,7 +65,11 @@ pub(crate) struct Plan {
     pub size: [u32; 2],
     pub resources: Vec<Declared>,
     pub steps: Vec<Step>,
+    /// Where the surfaces are that light meets.
+    #[cfg(feature = "inspect")]
+    pub surfaces: crate::inspect::SurfaceNames,
     home: Home,
+    part: &'static str,
     /// What a pass got wrong first.
     wrong: Option<Error>,
 }
@@ -73,12 +77,21 @@ pub(crate) struct Plan {
 impl Plan {
     /// An empty frame of so many pixels.
     pub fn new(size: [u32; 2]) -> Plan {
-        Plan { size, resources: Vec::new(), steps: Vec::new(), home: Home::Particles, wrong: None }
+        Plan {
+            size,
+            resources: Vec::new(),
+            steps: Vec::new(),
+            #[cfg(feature = "inspect")]
+            surfaces: Default::default(),
+            home: Home::Particles,
+            part: "",
+            wrong: None,
+        }
     }
 
-    /// Says what the passes that follow work for.
-    pub fn work_for(&mut self, home: Home) {
-        self.home = home;
+    /// Says what the passes that follow work for, and as what part of the frame.
+    pub fn work_for(&mut self, home: Home, part: &'static str) {
+        (self.home, self.part) = (home, part);
     }
 
     /// The plan, unless a pass declared something that cannot be.

@@ -9,6 +9,8 @@ use ash::vk;
 pub(crate) struct Step {
     pub pass: &'static str,
     pub home: super::Home,
+    /// As what part of the frame.
+    pub part: &'static str,
     pub uses: Vec<(Target, Access)>,
     pub work: Work,
 }
@@ -111,8 +113,8 @@ impl Plan {
         for (target, access) in &uses {
             self.used(pass, *target, *access);
         }
-        let home = self.home;
-        self.steps.push(Step { pass, home, uses, work });
+        let (home, part) = (self.home, self.part);
+        self.steps.push(Step { pass, home, part, uses, work });
     }
 
     /// Fills a buffer with one word, from an offset on, so many bytes (`vk::WHOLE_SIZE`: to its end).
