@@ -1,10 +1,11 @@
 //! The contract with the host: frames in flight, replaced resources, host scenes, output formats.
 
+use crate::drivers::SKY;
 use crate::support::{Case, Cloud, Driver, camera, each_driver, random_cloud, sphere};
 use ash::vk;
 use glam::Vec3;
 use meniscus::{
-    Equirect, Error, FrameInput, Particles, Renderer, SceneInput, Settings,
+    Error, FrameInput, Particles, Renderer, SceneInput, Settings,
     host::{Canvas, Gpu, HostError, Upload},
     prepare::{DevicePositions, Search},
     targets::Needs,
@@ -36,7 +37,7 @@ pub fn with_renderer(driver: &Driver, format: vk::Format, frames: u32, body: imp
     let mut renderer = unsafe { Renderer::new(gpu.host(frames), format) }.expect("renderer");
     renderer.resize(SIZE).expect("size");
     // SAFETY: recorded outside rendering, before any frame.
-    gpu.run(|cmd| Ok(unsafe { renderer.set_environment(cmd, &Equirect::procedural_sky()) }?)).expect("environment");
+    gpu.run(|cmd| Ok(unsafe { renderer.set_environment(cmd, &SKY) }?)).expect("environment");
     body(&gpu, &mut renderer);
     // SAFETY: every command buffer was waited for.
     unsafe { renderer.destroy() };

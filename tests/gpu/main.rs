@@ -5,6 +5,7 @@ mod analytic;
 mod background;
 mod compact;
 mod cull;
+mod drivers;
 mod extent;
 mod host;
 mod normals;
