@@ -157,6 +157,11 @@ pub fn each_driver(test: impl Fn(&Driver)) {
     }
 }
 
+/// How many drivers tests run on.
+pub fn count() -> usize {
+    POOL.labels.len()
+}
+
 impl Driver<'_> {
     /// As if no test had come before: no particles, no resources, no classes kept.
     fn start_anew(&self) {
