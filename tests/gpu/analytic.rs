@@ -3,7 +3,7 @@
 
 use crate::{
     refract::degrees,
-    support::{Choose, Case, Driver, Shot, each_driver, sphere},
+    support::{Case, Choose, Driver, Shot, each_driver, sphere},
 };
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use meniscus::{

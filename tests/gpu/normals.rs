@@ -1,6 +1,6 @@
 //! Normals of the smoothed body against their twin, which is fed the depths that the GPU itself smoothed.
 
-use crate::support::{Choose, Case, Driver, camera, each_driver, lattice, random_cloud, sphere};
+use crate::support::{Case, Choose, Driver, camera, each_driver, lattice, random_cloud, sphere};
 use glam::Vec3;
 use meniscus::shader::{COUNT_NORMAL_DEGENERATE, SIDE_BACK};
 use meniscus::twin::{normal::decode_normal, normals::normals, plane_fit::view_ray};

@@ -1,6 +1,6 @@
 //! Plane fitting against its twin, which is fed the depths and normals that the GPU itself read.
 
-use crate::support::{Choose, Case, Driver, Random, Shot, camera, each_driver, lattice, random_cloud, sphere};
+use crate::support::{Case, Choose, Driver, Random, Shot, camera, each_driver, lattice, random_cloud, sphere};
 use glam::{Mat3, Vec3};
 use meniscus::shader::{
     COUNT_FIT_GRAZING, COUNT_FIT_UNBOUNDED, COUNT_FIT_ZERO_NORMAL, FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT,

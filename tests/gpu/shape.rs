@@ -1,7 +1,7 @@
 //! Neighbours, classes and ellipsoids prepared on the device: the same sets as trying every pair, and what the CPU
 //! prepares.
 
-use crate::support::{Choose, Case, Cloud, Driver, Random, Shot, camera, each_driver};
+use crate::support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_driver};
 use glam::Vec3;
 use meniscus::{
     Class, Particles, Settings,

@@ -2,7 +2,7 @@
 
 use crate::{
     cull::assert_same,
-    support::{Choose, Case, Cloud, Driver, Random, Shot, camera, each_driver, random_cloud},
+    support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_driver, random_cloud},
 };
 use glam::{Mat3, Mat4, Vec3};
 use meniscus::{

@@ -2,7 +2,7 @@
 
 use crate::{
     cull::{around_the_near_plane, both, drawn_as_quads, point_size},
-    support::{Choose, Case, Driver, Random, Shot, camera, each_driver, random_cloud, sphere},
+    support::{Case, Choose, Driver, Random, Shot, camera, each_driver, random_cloud, sphere},
 };
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{

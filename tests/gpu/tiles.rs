@@ -1,6 +1,6 @@
 //! Tiles: the ranges of front depths equal the twin's, bit for bit.
 
-use crate::support::{Choose, Case, camera, each_driver, random_cloud};
+use crate::support::{Case, Choose, camera, each_driver, random_cloud};
 use glam::Vec3;
 use meniscus::{Settings, shader::FRONT_TILE, twin::tiles::tiles};
 
