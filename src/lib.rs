@@ -64,6 +64,7 @@ mod resources;
 pub mod settings;
 pub mod shader;
 mod slot;
+pub mod smooth;
 pub mod space;
 pub mod targets;
 pub mod twin;
