@@ -52,7 +52,7 @@ void main() {
     float in_space = -0.5 / (sigma * sigma);
     float sigma_depth = max(push.sigma_depth, 1e-6);
     float in_depth = -0.5 / (sigma_depth * sigma_depth);
-    ivec2 step = AXIS == 0 ? ivec2(1, 0) : ivec2(0, 1);
+    ivec2 step = ivec2(1 - AXIS, AXIS); // lavapipe 22.3 gets a choice between constant vectors wrong
     float rise_sum = 0.0, total = 0.0;
     for (int x = -reach; x <= reach; ++x) {
         float d = depth_at(pixel + x * step, layer);

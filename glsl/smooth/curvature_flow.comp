@@ -10,7 +10,7 @@
 //
 // name          unit                 range     published default
 // time_step     radii times pixels   >= 0      not printed; public implementations: 0.0005 in their own scenes' units
-// jump          radii                > 0       not printed; Truong18's comparison: 5
+// jump          radii                0 to 1000 not printed; Truong18's comparison: 5
 // iterations                                   as many as there is time for; public implementations: 60
 //
 // Explicit steps diverge above dt (a_x + a_y) / d = 1 (the flow spreads by at most a dt / (2 d) square pixels a step, and

@@ -85,7 +85,7 @@ void main() {
     float in_space = -4.5 / max(float(reach * reach), 1.0); // -1 / (2 sigma^2)
     vec2 range = vec2(own - push.threshold, own + push.threshold);
 #ifdef ALONG
-    ivec2 step = AXIS == 0 ? ivec2(1, 0) : ivec2(0, 1);
+    ivec2 step = ivec2(1 - AXIS, AXIS); // lavapipe 22.3 gets a choice between constant vectors wrong
     vec2 before = range, after = range;
     for (int x = 1; x <= reach; ++x) {
         Sample a = judge(pixel - x * step, layer, own, before, before);

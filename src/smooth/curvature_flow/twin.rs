@@ -11,8 +11,8 @@ use crate::{
 pub struct Parameters {
     /// Δt, in particle radii times pixels; at least 0. vdLaan09 prints none.
     pub time_step: f32,
-    /// A larger difference between neighbours is a boundary, in particle radii; more than 0. vdLaan09 prints none;
-    /// Truong18 compares with 5.
+    /// A larger difference between neighbours is a boundary, in particle radii; 0 to 1000. vdLaan09 prints
+    /// none; Truong18 compares with 5.
     pub jump: f32,
 }
 
@@ -21,7 +21,7 @@ pub struct Parameters {
 pub struct Flow {
     /// Depths.
     pub pixel: Vec<Pixel>,
-    /// Pixels whose step was shortened to the stable one, and how many of those rounding decides.
+    /// Pixels whose step was shortened to the stable one.
     pub shortened: u32,
     /// Pixels that were not moved.
     pub refused: u32,
@@ -41,47 +41,56 @@ pub fn flow(frame: &Frame, depth: &[f32], p: &Parameters) -> Flow {
     let (cx, cy) = (1.0 / ax, 1.0 / ay);
     let (mut shortened, mut refused, mut undecided) = (0, 0, 0);
     let pixel = map.each(|x, y, own| {
-        let d = derivatives(&map, x, y, p.jump);
+        let (d, sizes) = derivatives(&map, x, y, p.jump);
         let stable = own / (ax + ay);
         let step = f64::from(p.time_step).min(stable);
         shortened += u32::from(f64::from(p.time_step) > stable);
-        let h = mean_curvature([cx, cy], -own, &d.map(|v| -v));
-        let moved = own - h * step;
-        let pixel = Pixel { depth: moved, slack: rounding([ax, ay], own, &d, step, moved), or: None };
-        // The differences are taken as the shader takes them, and compared as 32-bit numbers.
+        let rate = |d: [f64; 5]| mean_curvature([cx, cy], -own, &d.map(|v| -v));
+        let moved = own - rate(d) * step;
+        // The rises that a derivative adds up are rounded by half a step each, and so is their sum.
+        let shaken = (0..5).map(|k| {
+            let mut other = d;
+            other[k] += 1.5 * f64::from(f32::EPSILON) * sizes[k];
+            (rate(other) - rate(d)).abs()
+        });
+        let slack = rounding([ax, ay], own, &d, step, moved) + step * shaken.sum::<f64>();
+        let pixel = Pixel { depth: moved, slack, or: None };
         let [near, jump] = [frame.viewport.z, p.jump].map(f64::from);
-        let keep = Pixel { depth: own, slack: 0.0, or: None };
         let far = !((moved - own).abs() <= jump) || moved < near;
-        let close = ((moved - own).abs() - jump).abs() <= pixel.slack || (moved - near).abs() <= pixel.slack;
+        let close = ((moved - own).abs() - jump).abs() <= slack || (moved - near).abs() <= slack;
         let doubt = close || (f64::from(p.time_step) - stable).abs() < 4.0 * f64::from(f32::EPSILON) * stable;
         undecided += u32::from(doubt);
         refused += u32::from(far);
         match (far, close) {
             (false, false) => pixel,
-            (true, false) => keep,
+            (true, false) => Pixel { depth: own, slack: 0.0, or: None },
             (_, true) => Pixel { or: Some(own), ..pixel },
         }
     });
     Flow { pixel, shortened, refused, undecided }
 }
 
-/// d_x, d_y, d_xx, d_yy, d_xy: central differences; zero across a boundary.
-fn derivatives(map: &Map, x: i32, y: i32, jump: f32) -> [f64; 5] {
+/// d_x, d_y, d_xx, d_yy, d_xy: central differences; zero across a boundary. Then what the rises they are made of would add
+/// up to without their signs.
+fn derivatives(map: &Map, x: i32, y: i32, jump: f32) -> ([f64; 5], [f64; 5]) {
     let own = map.at(x, y).unwrap_or(0.0);
+    // Rises before and after, and whether both are there.
     let pair = |i: i32, j: i32| {
         let [a, b] = [map.at(x - i, y - j), map.at(x + i, y + j)].map(|d| d.filter(|d| *d > 0.0));
         let (a, b) = (a?, b?);
         // In 32 bits, as the shader decides it: a difference is rounded alike everywhere.
-        ((a - own).abs() <= jump && (b - own).abs() <= jump).then_some((f64::from(a), f64::from(b)))
+        let near = (a - own).abs() <= jump && (b - own).abs() <= jump;
+        near.then_some([a, b].map(|d| f64::from(d) - f64::from(own)))
     };
-    let own = f64::from(own);
-    let along = |i, j| pair(i, j).map_or((0.0, 0.0), |(a, b)| (0.5 * (b - a), a + b - 2.0 * own));
-    let ((dx, dxx), (dy, dyy)) = (along(1, 0), along(0, 1));
-    let dxy = match (pair(1, 1), pair(1, -1)) {
-        (Some((a, b)), Some((c, d))) => 0.25 * (a + b - c - d),
-        _ => 0.0,
+    let along = |i, j| pair(i, j).unwrap_or_default();
+    let ([w, e], [n, s]) = (along(1, 0), along(0, 1));
+    let [size_x, size_y] = [w.abs() + e.abs(), n.abs() + s.abs()];
+    let (dxy, size_xy) = match (pair(1, 1), pair(1, -1)) {
+        (Some([a, b]), Some([c, d])) => (0.25 * (a + b - c - d), a.abs() + b.abs() + c.abs() + d.abs()),
+        _ => (0.0, 0.0),
     };
-    [dx, dy, dxx, dyy, dxy]
+    let derivatives = [0.5 * (e - w), 0.5 * (s - n), e + w, s + n, dxy];
+    (derivatives, [0.5 * size_x, 0.5 * size_y, size_x, size_y, 0.25 * size_xy])
 }
 
 /// H of eq. (6), from eqs. (4), (7), (8); C_x and C_y are negative where z is, as F_x and F_y are in the paper's eye space.
@@ -95,8 +104,8 @@ fn mean_curvature([cx, cy]: [f64; 2], z: f64, [zx, zy, zxx, zyy, zxy]: &[f64; 5]
     0.5 * (cy * e_x + cx * e_y) / d.powf(1.5)
 }
 
-/// Each term of the shader's sum is a product of a dozen factors, themselves differences: 24 ulp of what all terms
-/// would add up to without their signs; then half a step of the depth.
+/// Each term of the shader's sum is a product of up to a dozen factors: 24 ulp of what all terms would add up to without
+/// their signs; then half a step of the depth.
 fn rounding([ax, ay]: [f64; 2], own: f64, [dx, dy, dxx, dyy, dxy]: &[f64; 5], step: f64, moved: f64) -> f64 {
     let (p, q) = (ax * dx / own, ay * dy / own);
     let s = 1.0 + p * p + q * q;
