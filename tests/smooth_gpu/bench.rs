@@ -18,8 +18,6 @@ pub struct Job<'a> {
 pub struct Done {
     pub images: HashMap<&'static str, Vec<f32>>,
     pub counters: [u32; 8],
-    /// Milliseconds on the host's clock, submission to fence.
-    pub time: f64,
 }
 
 fn ok<T>(r: Result<T, vk::Result>) -> T {
@@ -188,7 +186,6 @@ pub fn run(gpu: &Gpu, job: &Job) -> Done {
             };
             device.update_descriptor_sets(&[write], &[]);
         }
-        let start = std::time::Instant::now();
         let result: Result<(), HostError> = gpu.run(|cmd| {
             let all = |cmd, from, to| {
                 let barriers: Vec<_> = images
@@ -205,7 +202,14 @@ pub fn run(gpu: &Gpu, job: &Job) -> Done {
                             .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)
                     })
                     .collect();
-                device.cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default().image_memory_barriers(&barriers));
+                let everything = [vk::MemoryBarrier2::default()
+                    .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+                    .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+                    .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+                    .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)];
+                let info =
+                    vk::DependencyInfo::default().image_memory_barriers(&barriers).memory_barriers(&everything);
+                device.cmd_pipeline_barrier2(cmd, &info);
             };
             let copy = vk::BufferImageCopy::default()
                 .image_subresource(vk::ImageSubresourceLayers {
@@ -237,8 +241,7 @@ pub fn run(gpu: &Gpu, job: &Job) -> Done {
             Ok(())
         });
         result.expect("run");
-        let time = start.elapsed().as_secs_f64() * 1e3;
-        let mut done = Done { images: HashMap::new(), counters: [0; 8], time };
+        let mut done = Done { images: HashMap::new(), counters: [0; 8] };
         done.counters.copy_from_slice(&memory.read(counters.1, 8));
         for (b, image, bound, view, _, buffer) in images {
             let read = memory.read(buffer.1, words).into_iter().map(f32::from_bits).collect();
