@@ -13,6 +13,8 @@ pub struct Job<'a> {
     pub inputs: &'a [(&'a str, &'a [f32])],
     pub constants: &'a [u32],
     pub push: &'a [f32],
+    /// Pixels along an edge of a group.
+    pub edge: u32,
 }
 
 pub struct Done {
@@ -233,7 +235,7 @@ pub fn run(gpu: &Gpu, job: &Job) -> Done {
             device.cmd_bind_descriptor_sets(cmd, vk::PipelineBindPoint::COMPUTE, layout, 0, &[set], &[]);
             let bytes: Vec<u8> = job.push.iter().flat_map(|c| c.to_ne_bytes()).collect();
             device.cmd_push_constants(cmd, layout, vk::ShaderStageFlags::COMPUTE, 0, &bytes);
-            device.cmd_dispatch(cmd, w.div_ceil(8), h.div_ceil(8), 2);
+            device.cmd_dispatch(cmd, w.div_ceil(job.edge), h.div_ceil(job.edge), 2);
             all(cmd, general, from);
             for i in &images {
                 device.cmd_copy_image_to_buffer(cmd, i.1, from, i.5.0, &[copy]);

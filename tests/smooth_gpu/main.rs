@@ -161,7 +161,8 @@ fn compare(label: &str, case: &Case, result: &[f32], twin: impl Fn(&[f32], usize
 }
 
 fn job(gpu: &Gpu, case: &Case, shader: &Shader, constants: &[u32], push: &[f32]) -> Done {
-    run(gpu, &Job { shader, frame: &case.frame, inputs: &[("depth_in", &case.depth)], constants, push })
+    let edge = if shader.name.ends_with("bilateral.comp") { constants[0] } else { IMAGE_GROUP };
+    run(gpu, &Job { shader, frame: &case.frame, inputs: &[("depth_in", &case.depth)], constants, push, edge })
 }
 
 fn layered(case: &Case, f: impl Fn(&[f32]) -> u32) -> u32 {
@@ -173,12 +174,13 @@ fn bilateral_filters() {
     each_driver(|gpu| {
         for c in cases() {
             for (sigma_space, sigma_depth, reach, projected) in
-                [(2.0, 1.5, 4, false), (0.3, 3.0, 12, true), (1.0, 0.2, 6, true), (50.0, 1e6, 3, false)]
+                [(2.0, 1.5, 4, false), (0.3, 3.0, 12, true), (1.0, 0.2, 6, true), (50.0, 1e6, 3, false), (0.6, 2.0, 27, true)]
             {
                 let p = bilateral::twin::Parameters { sigma_space, sigma_depth, reach, projected };
                 let push = [sigma_space, sigma_depth];
                 let label = format!("bilateral {}, {p:?}", c.name);
-                let constants = [reach, u32::from(projected), SLOT];
+                let edge = if reach <= 23 { 16 } else { 8 };
+                let constants = [edge, edge, reach, u32::from(projected), SLOT];
                 let done = job(gpu, &c, &BILATERAL_COMP, &constants, &push);
                 compare(&label, &c, &done.images["depth_out"], |d, _| bilateral::twin::bilateral(&c.frame, d, &p));
                 clipped(&label, &c, &done, if projected { 3.0 * sigma_space } else { 0.0 }, reach);
@@ -226,8 +228,8 @@ fn binomial_filter() {
                 let between = Case { name: c.name, frame: c.frame, depth: depth.clone() };
                 let inputs: [(&str, &[f32]); 2] = [("depth_in", depth), ("missing_in", missing)];
                 let shader = &BINOMIAL_DOWN_COMP;
-                let done =
-                    run(gpu, &Job { shader, frame: &c.frame, inputs: &inputs, constants: &constants, push: &[kernel] });
+                let (constants, push, edge) = (&constants, &[kernel], IMAGE_GROUP);
+                let done = run(gpu, &Job { shader, frame: &c.frame, inputs: &inputs, constants, push, edge });
                 let n = depth.len() / 2;
                 compare(&format!("{label} down"), &between, &done.images["depth_out"], |d, layer| {
                     binomial::twin::down(&c.frame, d, &missing[layer * n..][..n], &p)

@@ -12,7 +12,7 @@ pub struct Parameters {
     pub sigma_space: f32,
     /// Spread of the weights in depth, in particle radii; more than 0. Truong18 compares with a third of 10.
     pub sigma_depth: f32,
-    /// The window is 2 `reach` + 1 pixels, or at most that if `projected`.
+    /// The window is 2 `reach` + 1 pixels, or at most that if `projected`; 27 at most, or 64 along one axis.
     pub reach: u32,
     /// Whether `sigma_space` is a length at the pixel's depth; the window is then 3 of it.
     pub projected: bool,
