@@ -17,7 +17,7 @@
 // two dimensions admit a quarter each): longer ones are shortened to that.
 //
 // Counters: COUNTERS + 0: pixels whose step was shortened to the stable one.
-//           COUNTERS + 1: updates refused: farther than a jump, or before the near plane; the depth is kept.
+//           COUNTERS + 1: updates refused: they would end before the near plane; the depth is kept.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
@@ -60,7 +60,7 @@ void main() {
         float stable = own / (a.x + a.y);
         if (push.time_step > stable) atomicAdd(counters.at[COUNTERS], 1u);
         float update = min(push.time_step, stable) * (0.5 * flow / (s * sqrt(s) * own));
-        if (!(abs(update) <= push.jump) || own + update < frame.viewport.z) {
+        if (!(own + update >= frame.viewport.z)) {
             atomicAdd(counters.at[COUNTERS + 1], 1u);
         } else {
             result = own + update;

@@ -107,6 +107,9 @@ fn cases() -> Vec<Case> {
     }));
     all.push(case("far", [33, 29], |_, _, _| 1e12 * r.between(0.9, 1.1)));
     all.push(case("near", [33, 29], |_, _, _| 1e-3 * r.between(0.5, 2.0)));
+    let mut at_near = case("at the near plane", [33, 29], |_, _, _| 1.0 + 0.1 * r.unit());
+    at_near.frame.viewport.z = 1.05;
+    all.push(at_near);
     all.push(case("tilted, with jumps of exactly 1 and 10", [70, 33], |x, y, _| {
         10.0 + 0.25 * x as f32 + [0.0, 1.0, 11.0, 1.0][(y / 4) as usize % 4]
     }));

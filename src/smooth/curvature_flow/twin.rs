@@ -23,7 +23,7 @@ pub struct Flow {
     pub pixel: Vec<Pixel>,
     /// Pixels whose step was shortened to the stable one.
     pub shortened: u32,
-    /// Pixels that were not moved.
+    /// Pixels that were not moved, as they would have come to lie before the near plane.
     pub refused: u32,
     /// Pixels where rounding decides one of the two.
     pub undecided: u32,
@@ -55,13 +55,12 @@ pub fn flow(frame: &Frame, depth: &[f32], p: &Parameters) -> Flow {
         });
         let slack = rounding([ax, ay], own, &d, step, moved) + step * shaken.sum::<f64>();
         let pixel = Pixel { depth: moved, slack, or: None };
-        let [near, jump] = [frame.viewport.z, p.jump].map(f64::from);
-        let far = !((moved - own).abs() <= jump) || moved < near;
-        let close = ((moved - own).abs() - jump).abs() <= slack || (moved - near).abs() <= slack;
+        let near = f64::from(frame.viewport.z);
+        let (before, close) = (moved < near, (moved - near).abs() <= slack);
         let doubt = close || (f64::from(p.time_step) - stable).abs() < 4.0 * f64::from(f32::EPSILON) * stable;
         undecided += u32::from(doubt);
-        refused += u32::from(far);
-        match (far, close) {
+        refused += u32::from(before);
+        match (before, close) {
             (false, false) => pixel,
             (true, false) => Pixel { depth: own, slack: 0.0, or: None },
             (_, true) => Pixel { or: Some(own), ..pixel },
