@@ -1,4 +1,5 @@
-// The narrow-range filter (Truong18 section 4): FULL over a square window, or ALONG one axis.
+// The narrow-range filter (Truong18: "limiting the depth range", "bias correction", "dynamic range adjustment"): FULL over a
+// square window, or ALONG one axis.
 //   d'_i = sum_j w_ij f_ij / sum_j w_ij,  G_ij = exp(-|x_j - x_i|^2 / (2 sigma^2)), sigma = reach / 3
 //   d_j < low (too near):  w_ij = 0, and 0 for the pixel opposite j as well, so that nothing is left lopsided
 //   d_j > high (too far):  w_ij = G_ij, f_ij = d_i + clamp: the asymmetry that rounds edges off

@@ -9,7 +9,8 @@ type Filter = fn(&Frame, &[f32]) -> Vec<Pixel>;
 
 const BILATERAL: bilateral::twin::Parameters =
     bilateral::twin::Parameters { sigma_space: 0.5, sigma_depth: 1.0, reach: 6, projected: true };
-const BINOMIAL: binomial::twin::Parameters = binomial::twin::Parameters { kernel: 1.0, reach: 9, silhouette_map: false };
+const BINOMIAL: binomial::twin::Parameters =
+    binomial::twin::Parameters { kernel: 1.0, reach: 9, silhouette_map: false };
 const FLOW: curvature_flow::twin::Parameters = curvature_flow::twin::Parameters { time_step: 0.1, jump: 1.0 };
 const NARROW: narrow_range::twin::Parameters = narrow_range::twin::Parameters {
     kernel: 1.0,
@@ -24,11 +25,9 @@ const NARROW: narrow_range::twin::Parameters = narrow_range::twin::Parameters {
 const ALL: &[(&str, Option<Axis>, Filter)] = &[
     ("bilateral", None, |f, d| bilateral::twin::bilateral(f, d, &BILATERAL)),
     ("bilateral rows", Some(Axis::X), |f, d| bilateral_separable::twin::bilateral_separable(f, d, &BILATERAL, Axis::X)),
-    (
-        "bilateral columns",
-        Some(Axis::Y),
-        |f, d| bilateral_separable::twin::bilateral_separable(f, d, &BILATERAL, Axis::Y),
-    ),
+    ("bilateral columns", Some(Axis::Y), |f, d| {
+        bilateral_separable::twin::bilateral_separable(f, d, &BILATERAL, Axis::Y)
+    }),
     ("binomial rows", Some(Axis::X), |f, d| binomial::twin::across(f, d, &BINOMIAL).0),
     ("binomial columns", Some(Axis::Y), |f, d| binomial::twin::down(f, d, &vec![0.0; d.len()], &BINOMIAL)),
     ("curvature flow", None, |f, d| curvature_flow::twin::curvature_flow(f, d, &FLOW)),

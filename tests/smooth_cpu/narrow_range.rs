@@ -5,8 +5,7 @@ use meniscus::shader::Frame;
 use meniscus::smooth::narrow_range::twin::{Parameters, narrow_range, narrow_range_along};
 use meniscus::smooth::twin::{Axis, Pixel};
 
-const P: Parameters =
-    Parameters { kernel: 1.0, threshold: 1.0, clamp: 0.25, reach: 3, fixed: true, empty_far: false };
+const P: Parameters = Parameters { kernel: 1.0, threshold: 1.0, clamp: 0.25, reach: 3, fixed: true, empty_far: false };
 
 /// The middle after the filter over a square and along rows.
 fn both(frame: &Frame, depth: &[f32], p: &Parameters) -> [f64; 2] {

@@ -139,7 +139,8 @@ pub fn run(gpu: &Gpu, job: &Job) -> Done {
         let set_layouts = [set_layout];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&push);
         let layout = ok(device.create_pipeline_layout(&info, None));
-        let module = ok(device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(job.shader.spirv), None));
+        let module =
+            ok(device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(job.shader.spirv), None));
         let entries: Vec<_> = (0..job.constants.len() as u32)
             .map(|i| vk::SpecializationMapEntry { constant_id: i, offset: 4 * i, size: 4 })
             .collect();
@@ -151,8 +152,7 @@ pub fn run(gpu: &Gpu, job: &Job) -> Done {
             .name(c"main")
             .specialization_info(&special);
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
-        let pipeline =
-            device.create_compute_pipelines(vk::PipelineCache::null(), &info, None).expect("pipeline")[0];
+        let pipeline = device.create_compute_pipelines(vk::PipelineCache::null(), &info, None).expect("pipeline")[0];
         let sizes = [
             vk::DescriptorType::SAMPLED_IMAGE,
             vk::DescriptorType::STORAGE_IMAGE,
@@ -175,12 +175,8 @@ pub fn run(gpu: &Gpu, job: &Job) -> Done {
             let buffer_info = [vk::DescriptorBufferInfo { buffer, offset: 0, range: vk::WHOLE_SIZE }];
             let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(b.index);
             let write = match b.kind {
-                Kind::SampledImage => {
-                    write.descriptor_type(vk::DescriptorType::SAMPLED_IMAGE).image_info(&image_info)
-                }
-                Kind::StorageImage => {
-                    write.descriptor_type(vk::DescriptorType::STORAGE_IMAGE).image_info(&image_info)
-                }
+                Kind::SampledImage => write.descriptor_type(vk::DescriptorType::SAMPLED_IMAGE).image_info(&image_info),
+                Kind::StorageImage => write.descriptor_type(vk::DescriptorType::STORAGE_IMAGE).image_info(&image_info),
                 Kind::UniformBuffer => {
                     write.descriptor_type(vk::DescriptorType::UNIFORM_BUFFER).buffer_info(&buffer_info)
                 }
@@ -209,8 +205,7 @@ pub fn run(gpu: &Gpu, job: &Job) -> Done {
                     .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
                     .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
                     .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)];
-                let info =
-                    vk::DependencyInfo::default().image_memory_barriers(&barriers).memory_barriers(&everything);
+                let info = vk::DependencyInfo::default().image_memory_barriers(&barriers).memory_barriers(&everything);
                 device.cmd_pipeline_barrier2(cmd, &info);
             };
             let copy = vk::BufferImageCopy::default()

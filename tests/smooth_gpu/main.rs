@@ -61,11 +61,7 @@ fn balls(size: [u32; 2], count: usize, z: [f32; 2], radius: f32) -> Case {
     for _ in 0..count {
         let d = r.between(z[0], z[1]);
         let p = [r.between(0.0, size[0] as f32), r.between(0.0, size[1] as f32)];
-        all.push(Vec3::new(
-            (p[0] - f.to_pixel.z) / f.to_pixel.x * d,
-            (p[1] - f.to_pixel.w) / f.to_pixel.y * d,
-            -d,
-        ));
+        all.push(Vec3::new((p[0] - f.to_pixel.z) / f.to_pixel.x * d, (p[1] - f.to_pixel.w) / f.to_pixel.y * d, -d));
     }
     case("balls", size, |x, y, layer| {
         let v = Vec3::new(
@@ -176,9 +172,13 @@ fn layered(case: &Case, f: impl Fn(&[f32]) -> u32) -> u32 {
 fn bilateral_filters() {
     each_driver(|gpu| {
         for c in cases() {
-            for (sigma_space, sigma_depth, reach, projected) in
-                [(2.0, 1.5, 4, false), (0.3, 3.0, 12, true), (1.0, 0.2, 6, true), (50.0, 1e6, 3, false), (0.6, 2.0, 27, true)]
-            {
+            for (sigma_space, sigma_depth, reach, projected) in [
+                (2.0, 1.5, 4, false),
+                (0.3, 3.0, 12, true),
+                (1.0, 0.2, 6, true),
+                (50.0, 1e6, 3, false),
+                (0.6, 2.0, 27, true),
+            ] {
                 let p = bilateral::twin::Parameters { sigma_space, sigma_depth, reach, projected };
                 let push = [sigma_space, sigma_depth];
                 let label = format!("bilateral {}, {p:?}", c.name);
@@ -255,8 +255,7 @@ fn curvature_flow_step() {
                     curvature_flow::twin::curvature_flow(&c.frame, d, &p)
                 });
                 let n = c.depth.len() / 2;
-                let flows: Vec<_> =
-                    c.depth.chunks(n).map(|d| curvature_flow::twin::flow(&c.frame, d, &p)).collect();
+                let flows: Vec<_> = c.depth.chunks(n).map(|d| curvature_flow::twin::flow(&c.frame, d, &p)).collect();
                 let doubt: u32 = flows.iter().map(|f| f.undecided).sum();
                 let at = SLOT as usize;
                 for (got, twin) in [

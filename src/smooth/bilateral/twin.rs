@@ -18,6 +18,14 @@ pub struct Parameters {
     pub projected: bool,
 }
 
+impl Default for Parameters {
+    /// What Truong18's own program compares with: a kernel of half a projected radius and a range of 10 radii, three sigma
+    /// each.
+    fn default() -> Parameters {
+        Parameters { sigma_space: 0.5 / 3.0, sigma_depth: 10.0 / 3.0, reach: 27, projected: true }
+    }
+}
+
 /// One iteration.
 pub fn bilateral(frame: &Frame, depth: &[f32], p: &Parameters) -> Vec<Pixel> {
     let map = Map::new(frame, depth);

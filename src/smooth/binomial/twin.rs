@@ -16,6 +16,12 @@ pub struct Parameters {
     pub silhouette_map: bool,
 }
 
+impl Default for Parameters {
+    fn default() -> Parameters {
+        Parameters { kernel: 1.0, reach: 60, silhouette_map: true }
+    }
+}
+
 /// Binomial coefficient B(n, k).
 fn binomial_coefficient(n: i32, k: i32) -> f64 {
     (1..=k).map(|i| f64::from(n - k + i) / f64::from(i)).product()
@@ -33,9 +39,8 @@ fn each_kernel(
         let (near, other) = reach(projected(frame, p.kernel, own), p.reach);
         let with = |k: i32| {
             let middle = binomial_coefficient(2 * k, k);
-            let kernel: Vec<_> = (-k..=k)
-                .map(|i| (i, binomial_coefficient(2 * k, k + i) / middle, 3.0 * f64::from(i.abs())))
-                .collect();
+            let kernel: Vec<_> =
+                (-k..=k).map(|i| (i, binomial_coefficient(2 * k, k + i) / middle, 3.0 * f64::from(i.abs()))).collect();
             result(x, y, own, &kernel)
         };
         with(near).either(other.map(with))

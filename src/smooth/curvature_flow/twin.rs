@@ -1,4 +1,4 @@
-//! Twin of `glsl/smooth/curvature_flow.comp`: vdLaan09 §3.2 as printed, in 64 bits and with z = -depth, where the shader
+//! Twin of `glsl/smooth/curvature_flow.comp`: vdLaan09's formulas as printed, in 64 bits and with z = -depth, where the shader
 //! has one sum of small terms.
 
 use crate::{
@@ -14,6 +14,13 @@ pub struct Parameters {
     /// A larger difference between neighbours is a boundary, in particle radii; 0 to 1000. vdLaan09 prints
     /// none; Truong18 compares with 5.
     pub jump: f32,
+}
+
+impl Default for Parameters {
+    /// The step is ours: the longest that is stable where a radius covers 10 pixels.
+    fn default() -> Parameters {
+        Parameters { time_step: 0.05, jump: 5.0 }
+    }
 }
 
 /// One step's result.
@@ -92,7 +99,8 @@ fn derivatives(map: &Map, x: i32, y: i32, jump: f32) -> ([f64; 5], [f64; 5]) {
     (derivatives, [0.5 * size_x, 0.5 * size_y, size_x, size_y, 0.25 * size_xy])
 }
 
-/// H of eq. (6), from eqs. (4), (7), (8); C_x and C_y are negative where z is, as F_x and F_y are in the paper's eye space.
+/// H from D, its derivatives, E_x and E_y. C_x and C_y are negative because eye-space positions are multiples of z, which is;
+/// the other sign would roughen.
 fn mean_curvature([cx, cy]: [f64; 2], z: f64, [zx, zy, zxx, zyy, zxy]: &[f64; 5]) -> f64 {
     let (cx, cy) = (-cx, -cy);
     let d = (cy * zx).powi(2) + (cx * zy).powi(2) + (cx * cy * z).powi(2);

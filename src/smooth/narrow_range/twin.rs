@@ -1,4 +1,4 @@
-//! Twin of `glsl/smooth/narrow_range.comp` (Truong18 §4).
+//! Twin of `glsl/smooth/narrow_range.comp` (Truong18).
 
 use crate::{
     shader::Frame,
@@ -21,6 +21,19 @@ pub struct Parameters {
     pub fixed: bool,
     /// Whether no surface counts as too far (Truong18) or for nothing.
     pub empty_far: bool,
+}
+
+impl Default for Parameters {
+    fn default() -> Parameters {
+        Parameters { kernel: 0.5, threshold: 10.0, clamp: 1.0, reach: 100, fixed: false, empty_far: false }
+    }
+}
+
+impl Parameters {
+    /// The clean-up that follows the two directions.
+    pub fn clean_up(self) -> Parameters {
+        Parameters { reach: 4, fixed: true, ..self }
+    }
 }
 
 /// What a neighbour is to a pixel.
@@ -83,8 +96,7 @@ pub fn narrow_range(frame: &Frame, depth: &[f32], p: &Parameters) -> Vec<Pixel> 
                     if dx.abs().max(dy.abs()) != ring {
                         continue;
                     }
-                    let [here, opposite] =
-                        [(dx, dy), (-dx, -dy)].map(|(i, j)| range.judge(map.at(x + i, y + j), p));
+                    let [here, opposite] = [(dx, dy), (-dx, -dy)].map(|(i, j)| range.judge(map.at(x + i, y + j), p));
                     wider = wider.widened(here, p);
                     if opposite != Sample::Near {
                         add(&mut average, here, own, f64::from(dx * dx + dy * dy), reach, p);
@@ -133,12 +145,7 @@ fn add(average: &mut Average, sample: Sample, own: f64, square: f64, reach: i32,
     average.add((-x).exp(), rise, exp_ulp(x, 4.0));
 }
 
-fn each_kernel(
-    frame: &Frame,
-    map: Map,
-    p: &Parameters,
-    result: impl Fn(i32, i32, f64, i32) -> Pixel,
-) -> Vec<Pixel> {
+fn each_kernel(frame: &Frame, map: Map, p: &Parameters, result: impl Fn(i32, i32, f64, i32) -> Pixel) -> Vec<Pixel> {
     map.each(|x, y, own| {
         if p.fixed {
             return result(x, y, own, p.reach as i32);
