@@ -50,6 +50,9 @@ pub struct Renderer {
     /// Where the last frame's surfaces are.
     #[cfg(feature = "inspect")]
     pub(crate) surfaces: crate::inspect::SurfaceNames,
+    /// Names of the last frame's counters.
+    #[cfg(feature = "inspect")]
+    pub(crate) counters: [Vec<&'static str>; 2],
     /// Whether the last frame left classes.
     last_classes: bool,
 }
@@ -119,6 +122,8 @@ impl Renderer {
             inspection: Default::default(),
             #[cfg(feature = "inspect")]
             surfaces: Default::default(),
+            #[cfg(feature = "inspect")]
+            counters: Default::default(),
             last_classes: false,
         };
         for _ in 0..renderer.host.frames_in_flight {
@@ -341,6 +346,7 @@ impl Renderer {
         #[cfg(feature = "inspect")]
         {
             self.surfaces = plan.surfaces;
+            self.counters = plan.counters.clone();
         }
 
         block.count = scene.count;

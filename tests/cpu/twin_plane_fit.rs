@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use meniscus::shader::Frame;
 use meniscus::space::Space;
 use meniscus::twin::normal::{decode_normal, encode_normal};
-use meniscus::twin::plane_fit::{Fit, Outcome, plane_fit, view_ray};
+use meniscus::smooth::plane_fit::twin::{Fit, Outcome, plane_fit, view_ray};
 use meniscus::inspect::uniforms;
 use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
 use meniscus::{Camera, Settings};

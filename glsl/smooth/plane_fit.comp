@@ -15,7 +15,8 @@ layout(push_constant) uniform PushBlock { float sigma; } push; // of eq. (2), in
 layout(set = 0, binding = 1) uniform texture2DArray depth_in;
 layout(set = 0, binding = 2) uniform utexture2DArray normal_raw;
 layout(set = 0, binding = 3, r32f) uniform writeonly image2DArray depth_out;
-layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
+layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters; // normals that cancel, grazing rays, updates too long
+layout(constant_id = 4) const uint COUNTERS = 0; // slot of its first counter
 
 const int TILE = int(gl_WorkGroupSize.x);
 const int EDGE = TILE + 2 * HALF_WINDOW;
@@ -83,15 +84,15 @@ void main() {
     float result = own;
     float length_sum = length(normal);
     if (length_sum < 1e-6 * total) {
-        atomicAdd(counters.at[COUNT_FIT_ZERO_NORMAL], 1u);
+        atomicAdd(counters.at[COUNTERS], 1u);
     } else {
         vec3 n = normal / length_sum;
         float facing = dot(n, v);
         float update = (dot(n.xy, lateral) + facing * along) / (facing * total);
         if (abs(facing) < FIT_GRAZING_LIMIT * length(v)) {
-            atomicAdd(counters.at[COUNT_FIT_GRAZING], 1u);
+            atomicAdd(counters.at[COUNTERS + 1u], 1u);
         } else if (!(abs(update) <= FIT_UPDATE_LIMIT * push.sigma) || own + update < frame.near) {
-            atomicAdd(counters.at[COUNT_FIT_UNBOUNDED], 1u);
+            atomicAdd(counters.at[COUNTERS + 2u], 1u);
         } else {
             result = own + update;
         }
