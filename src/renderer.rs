@@ -310,7 +310,6 @@ impl Renderer {
             let shift = input.camera.view.w_axis.truncate() * space::power_of_two(p.radius);
             block.view.w_axis = shift.extend(1.0);
         }
-        input.check_handles()?;
         // Squares of distances are taken of it.
         if !block.view.w_axis.is_finite() || block.view.w_axis.abs().max_element() > FARTHEST_EYE {
             let remedy = format!("the eye is more than {FARTHEST_EYE:e} particle radii away: go nearer");
@@ -330,6 +329,7 @@ impl Renderer {
         if let Some(p) = &input.positions {
             self.check_bindings(&plan, p)?;
         }
+        input.check_handles()?;
         check_memory(&self.host, &self.limits, &self.tables, &plan)?;
         self.pipelines.make(&self.host, plan.recipes())?;
 
