@@ -11,6 +11,7 @@ pub struct Binding {
 
 // SPIR-V 1.6, section 3: the instructions, decorations and storage classes that matter here.
 const OP_NAME: u32 = 5;
+const OP_MEMBER_NAME: u32 = 6;
 const OP_TYPE_IMAGE: u32 = 25;
 const OP_TYPE_SAMPLER: u32 = 26;
 const OP_TYPE_POINTER: u32 = 32;
@@ -24,6 +25,7 @@ const STORAGE_BUFFER: u32 = 12;
 
 pub fn bindings(words: &[u32]) -> Result<Vec<Binding>, String> {
     let mut names = HashMap::new();
+    let mut first_members = HashMap::new();
     let mut binding_of = HashMap::new();
     let mut kind_of = HashMap::new();
     let mut pointee = HashMap::new();
@@ -34,8 +36,10 @@ pub fn bindings(words: &[u32]) -> Result<Vec<Binding>, String> {
         let args = words.get(at + 1..at + count).ok_or("SPIR-V ends inside an instruction")?;
         match op {
             OP_NAME => {
-                let bytes: Vec<u8> = args[1..].iter().flat_map(|w| w.to_le_bytes()).take_while(|b| *b != 0).collect();
-                names.insert(args[0], String::from_utf8_lossy(&bytes).into_owned());
+                names.insert(args[0], text(&args[1..]));
+            }
+            OP_MEMBER_NAME if args[1] == 0 => {
+                first_members.insert(args[0], text(&args[2..]));
             }
             OP_DECORATE if args[1] == DECORATION_BINDING => {
                 binding_of.insert(args[0], args[2]);
@@ -68,9 +72,17 @@ pub fn bindings(words: &[u32]) -> Result<Vec<Binding>, String> {
             }
             other => return Err(format!("binding {index} has storage class {other} no pass uses")),
         };
-        let name = names.get(&variable).cloned().unwrap_or_default();
+        // A block without a name of its own is known by its member.
+        let name = names.get(&variable).filter(|n| !n.is_empty()).or(first_members.get(&pointee[&pointer]));
+        let name = name.cloned().unwrap_or_default();
         found.push(Binding { index, name, kind });
     }
     found.sort_by_key(|b| b.index);
     Ok(found)
+}
+
+/// A literal string of SPIR-V.
+fn text(words: &[u32]) -> String {
+    let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).take_while(|b| *b != 0).collect();
+    String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -10,6 +10,7 @@ mod house;
 #[cfg(feature = "io")]
 mod io;
 mod prepare;
+mod shared_blocks;
 mod twin_normals;
 mod twin_optics;
 mod twin_plane_fit;
