@@ -1,10 +1,12 @@
 // From neighbours to what is drawn: number density and class (Imai16 section 4.1), and for the body the ellipsoid of
-// YuTurk13. One invocation takes SHAPE_RUN particles that follow each other in the sorted order, those of one column of cells
-// together, one a component: what is looked up and read once serves all. Candidates are tested exactly, so that neighbours are
-// the same set however they are found.
+// YuTurk13 (docs/methods.md, "Preparation").
 //
-// Sorted cells: cells as wide as the support, so 5 x 5 runs of 5 cells. RELATION_TABLE: one run of the relation table, whose
-// cells are as wide as the reach.
+// One invocation takes SHAPE_RUN particles that follow each other in the sorted order. Those of them that lie in the same cell,
+// or in the next along z, are taken together, each in a component of a vector: what is looked up and read once serves all.
+//
+// Candidates for neighbours come in runs of the sorted order. Sorted cells are as wide as the support, so 5 x 5 runs of 5
+// cells hold all candidates. With RELATION_TABLE cells are as wide as the reach, and one run of the table holds them all.
+// Either way candidates are tested exactly, so that the neighbours are the same set.
 #version 460
 // Compiled with any of: NEIGHBOURS, KEEP_CLASSES
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,5 @@
-// One iteration of plane fitting (Imai16 eqs. 2 to 5) on the front (layer 0) and back (layer 1) of the body.
+// One iteration of plane fitting (Imai16 eqs. 2 to 5; docs/methods.md, "Smoothing") on the front (layer 0) and back
+// (layer 1) of the body.
 //
 // Everything is measured from the pixel's own point p_i: p_j - p_i = d_j (v_j - v_i) + (d_j - d_i) v_i, and eq. (5)
 // becomes d'_i = d_i + n.(mean p_j - p_i) / (n.v_i), in which nothing large cancels.
@@ -23,21 +24,8 @@ const int EDGE = TILE + 2 * HALF_WINDOW;
 shared vec4 tile[EDGE * EDGE]; // raw normal, depth (0: no surface)
 shared uint occupied;
 
-void main() {
-    ivec2 size = ivec2(frame.size);
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 origin = ivec2(gl_WorkGroupID.xy) * TILE - HALF_WINDOW;
-    int layer = int(gl_WorkGroupID.z);
-    if (gl_LocalInvocationIndex == 0u) occupied = 0u;
-    float own = 0.0; // negative (the eye is inside) and zero (nothing) pass through unchanged
-    if (all(lessThan(pixel, size))) own = texelFetch(depth_in, ivec3(pixel, layer), 0).x;
-    barrier();
-    if (own > 0.0) occupied = 1u;
-    barrier();
-    if (occupied == 0u) {
-        if (all(lessThan(pixel, size))) imageStore(depth_out, ivec3(pixel, layer), vec4(own));
-        return;
-    }
+// The window's pixels of a whole group, read once.
+void load_tile(ivec2 origin, ivec2 size, int layer) {
     for (int k = int(gl_LocalInvocationIndex); k < EDGE * EDGE; k += TILE * TILE) {
         ivec2 p = origin + ivec2(k % EDGE, k / EDGE);
         vec4 entry = vec4(0.0);
@@ -47,21 +35,21 @@ void main() {
         }
         tile[k] = entry;
     }
-    barrier();
-    if (any(greaterThanEqual(pixel, size))) return;
-    if (own <= 0.0) {
-        imageStore(depth_out, ivec3(pixel, layer), vec4(own));
-        return;
-    }
+}
 
-    vec3 v = view_ray(vec2(pixel) + 0.5);
+// Sums over a pixel's window, of weights w.
+struct Sums {
+    vec3 normal;
+    vec2 lateral; // of w d_j (v_j - v_i)
+    float along;  // of w (d_j - d_i)
+    float total;  // of w
+};
+
+Sums sum_window(vec3 v, float own) {
     vec2 step = 1.0 / frame.pixel_scale;
     float inverse = 1.0 / (push.sigma * push.sigma);
     ivec2 home = ivec2(gl_LocalInvocationID.xy) + HALF_WINDOW;
-    vec3 normal = vec3(0.0);
-    vec2 lateral = vec2(0.0); // sum of w d_j (v_j - v_i)
-    float along = 0.0;        // sum of w (d_j - d_i)
-    float total = 0.0;
+    Sums s = Sums(vec3(0.0), vec2(0.0), 0.0, 0.0);
     for (int y = -HALF_WINDOW; y <= HALF_WINDOW; ++y) {
         for (int x = -HALF_WINDOW; x <= HALF_WINDOW; ++x) {
             vec4 entry = tile[(home.y + y) * EDGE + home.x + x];
@@ -74,28 +62,57 @@ void main() {
                 square = dot(apart, apart);
             }
             float w = exp(-square * inverse);
-            normal += w * entry.xyz;
-            lateral += w * shift;
-            along += w * rise;
-            total += w;
+            s.normal += w * entry.xyz;
+            s.lateral += w * shift;
+            s.along += w * rise;
+            s.total += w;
         }
     }
+    return s;
+}
 
-    float result = own;
-    float length_sum = length(normal);
-    if (length_sum < 1e-6 * total) {
+// The pixel's depth on the plane of eqs. (3) and (4), or its own where eq. (5) is not to be trusted.
+float fitted(Sums s, vec3 v, float own) {
+    float length_sum = length(s.normal);
+    if (length_sum < 1e-6 * s.total) {
         atomicAdd(counters.at[COUNTERS], 1u);
-    } else {
-        vec3 n = normal / length_sum;
-        float facing = dot(n, v);
-        float update = (dot(n.xy, lateral) + facing * along) / (facing * total);
-        if (abs(facing) < FIT_GRAZING_LIMIT * length(v)) {
-            atomicAdd(counters.at[COUNTERS + 1u], 1u);
-        } else if (!(abs(update) <= FIT_UPDATE_LIMIT * push.sigma) || own + update < frame.near) {
-            atomicAdd(counters.at[COUNTERS + 2u], 1u);
-        } else {
-            result = own + update;
-        }
+        return own;
+    }
+    vec3 n = s.normal / length_sum;
+    float facing = dot(n, v);
+    float update = (dot(n.xy, s.lateral) + facing * s.along) / (facing * s.total);
+    if (abs(facing) < FIT_GRAZING_LIMIT * length(v)) {
+        atomicAdd(counters.at[COUNTERS + 1u], 1u);
+        return own;
+    }
+    if (!(abs(update) <= FIT_UPDATE_LIMIT * push.sigma) || own + update < frame.near) {
+        atomicAdd(counters.at[COUNTERS + 2u], 1u);
+        return own;
+    }
+    return own + update;
+}
+
+void main() {
+    ivec2 size = ivec2(frame.size);
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    int layer = int(gl_WorkGroupID.z);
+    if (gl_LocalInvocationIndex == 0u) occupied = 0u;
+    float own = 0.0; // negative (the eye is inside) and zero (nothing) pass through unchanged
+    if (all(lessThan(pixel, size))) own = texelFetch(depth_in, ivec3(pixel, layer), 0).x;
+    barrier();
+    if (own > 0.0) occupied = 1u;
+    barrier();
+    if (occupied == 0u) {
+        if (all(lessThan(pixel, size))) imageStore(depth_out, ivec3(pixel, layer), vec4(own));
+        return;
+    }
+    load_tile(ivec2(gl_WorkGroupID.xy) * TILE - HALF_WINDOW, size, layer);
+    barrier();
+    if (any(greaterThanEqual(pixel, size))) return;
+    float result = own;
+    if (own > 0.0) {
+        vec3 v = view_ray(vec2(pixel) + 0.5);
+        result = fitted(sum_window(v, own), v, own);
     }
     imageStore(depth_out, ivec3(pixel, layer), vec4(result));
 }

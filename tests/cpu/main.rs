@@ -11,6 +11,7 @@ mod house;
 mod io;
 mod prepare;
 mod smooth;
+mod shared_blocks;
 mod twin_normals;
 mod twin_optics;
 mod twin_plane_fit;
