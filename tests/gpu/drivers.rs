@@ -16,7 +16,7 @@ pub static SKY: LazyLock<Equirect> = LazyLock::new(Equirect::procedural_sky);
 
 /// What is made once on a driver. The driver's references are to what the two pointers own.
 struct Made {
-    driver: Option<Driver<'static>>,
+    driver: Option<Box<Driver<'static>>>,
     gpu: *mut Gpu<'static>,
     instance: *mut Instance,
 }
@@ -33,13 +33,13 @@ impl Made {
             let info = (*instance).pick(Some(label)).expect("it was there a moment ago");
             made.gpu = Box::into_raw(Box::new(Gpu::new(&*instance, info).expect("device")));
             let session = Session::new(&*made.gpu, [1, 1], &SKY).expect("session");
-            made.driver = Some(Driver::new(&*instance, session, label));
+            made.driver = Some(Box::new(Driver::new(&*instance, session, label)));
         }
         made
     }
 
     fn driver(&self) -> &Driver<'static> {
-        self.driver.as_ref().expect("until `end`")
+        self.driver.as_deref().expect("until `end`")
     }
 
     /// Destroys everything: what it says of that, the validation layer says of what was left.
