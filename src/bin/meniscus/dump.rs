@@ -1,12 +1,13 @@
 //! `--dump`: every intermediate target as .npy, so that any pass can be recomputed from the dump alone.
 
-use crate::{codes, options, outputs::Dump, render::Job};
+use crate::{choices, codes, options, outputs::Dump, render::Job};
 use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     host::Session,
+    inspect::Walk,
     shader::{SIDE_BACK, SIDE_FRONT},
+    smooth::Smooth,
     space::Space,
-    targets::Id,
     twin::normal::decode_normal,
 };
 use npyz::WriterBuilder;
@@ -17,14 +18,14 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     let out = Folder { dump: Dump::new(folder)?, size: job.size, radius: job.scene.particles.radius };
-    let needs = session.renderer.needs(&job.settings, true);
-    let smooth = (needs.body_depth(), needs.body_normal());
+    let surfaces = session.renderer.surfaces();
     let targets = [
-        ("splash", "_raw", Id::SplashDepth, Id::SplashNormal),
-        ("body", "_raw", Id::BodyDepthRaw, Id::BodyNormalRaw),
-        ("body", "", smooth.0, smooth.1),
+        ("splash", "_raw", surfaces.splash_depth, surfaces.splash_normal),
+        ("body", "_raw", Some("body depth (ray-cast)"), Some("body normal (ray-cast)")),
+        ("body", "", surfaces.body_depth, surfaces.body_normal),
     ];
     for (class, raw, depth, normal) in targets {
+        let (Some(depth), Some(normal)) = (depth, normal) else { continue };
         for (side, layer) in [("front", SIDE_FRONT), ("back", SIDE_BACK)] {
             let (Some(depths), Some(normals)) = (session.words(depth, layer)?, session.words(normal, layer)?) else {
                 continue;
@@ -32,12 +33,12 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
             out.maps(&format!("{class}_{side}"), raw, &depths, &normals)?;
         }
     }
-    let walk = floats(session.words(Id::Walk, 0)?);
+    let walk = floats(session.words("walk (debug)", 0)?);
     for (k, name) in ["pattern", "outcome", "hits", "path_length"].into_iter().enumerate() {
         let unit = if name == "path_length" { out.radius } else { 1.0 };
         out.array(name, 1, walk.chunks_exact(4).map(|w| w[k] * unit))?;
     }
-    let direction = floats(session.words(Id::Direction, 0)?);
+    let direction = floats(session.words("final direction (debug)", 0)?);
     out.array("final_direction", 3, direction.chunks_exact(4).flat_map(|d| [d[0], d[1], d[2]]))?;
     out.array("color_linear", 3, session.picture()?.into_iter().flatten())?;
     out.dump.write("particles.npz", &particles(job)?)?;
@@ -144,8 +145,10 @@ pub fn frame(job: &Job) -> serde_json::Value {
         |table: &[(u32, &'static str)]| table.iter().map(|(c, t)| (c.to_string(), *t)).collect::<BTreeMap<_, _>>();
     let bounds = job.scene.particles.bounds().unwrap_or_default();
     // In radii, whatever the origin.
-    let search = radius * job.camera.uniforms(s, job.size, &Space::new(radius, Vec3::ZERO), bounds).search;
-    json!({
+    let uniforms = job.camera.uniforms(s, job.size, &Space::new(radius, Vec3::ZERO), bounds);
+    let search = radius * uniforms.search;
+    let walk = Walk::of(&s.method.optics);
+    let mut frame = json!({
         "width": job.size[0],
         "height": job.size[1],
         "view": rows(world_view(job.camera.view, job.scene.origin)),
@@ -155,20 +158,16 @@ pub fn frame(job: &Job) -> serde_json::Value {
         "eye_inside": job.eye_inside,
         "origin": job.scene.origin.to_array(),
         "radius": radius,
-        "window": s.window,
-        "iterations": s.iterations,
-        "sigma": s.sigma * radius,
-        "weighting": options::name(&options::WEIGHTING, s.weighting),
-        "plane_fit_guards": {
-            "grazing": meniscus::shader::FIT_GRAZING_LIMIT,
-            "update": meniscus::shader::FIT_UPDATE_LIMIT * s.sigma * radius,
+        "environment_rotation": job.camera.environment_rotation,
+        "settings": choices::record(s),
+        "units": choices::units(s),
+        "asked": job.picture.record(),
+        "plane_fit_guards": matches!(s.method.smooth, Smooth::PlaneFit(_)).then(|| json!({
+            "grazing": uniforms.smoothing.z,
+            "update": uniforms.smoothing.y * radius,
             "meaning": "the old depth is kept where |n.v| (v unit) is below `grazing` or the update exceeds `update`",
-        },
-        "refractions": s.refractions,
-        "internal_reflections": s.internal_reflections,
-        "fresnel": options::name(&options::FRESNEL, s.fresnel),
-        "ior": s.ior,
-        "absorption": s.absorption.to_array(),
+        })),
+        "refractions": walk.map(|w| w.refractions),
         "sampling": {
             "jump": search.z,
             "accepted": search.y,
@@ -182,5 +181,14 @@ pub fn frame(job: &Job) -> serde_json::Value {
         "normals": "eye space, outward: fronts towards the viewer, backs away from it",
         "particle_classes": {"0": "splash", "1": "body"},
         "command": options::command(),
-    })
+    });
+    // Each parameter by its name too; instead of lengths in particle radii those in world units.
+    let lengths = choices::lengths(s, radius);
+    let plain = choices::record(s).into_iter().filter(|(name, _)| !lengths.contains_key(&choices::in_world(name)));
+    if let Some(fields) = frame.as_object_mut() {
+        plain.chain(lengths.clone()).for_each(|(name, value)| {
+            fields.entry(name).or_insert(value);
+        });
+    }
+    frame
 }

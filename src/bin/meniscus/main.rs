@@ -4,16 +4,19 @@
 
 mod bench;
 mod camera;
+mod choices;
 mod codes;
 mod dump;
 mod empty;
 mod info;
 mod options;
 mod outputs;
+mod picture;
 mod prepared;
 mod render;
 mod report;
 mod scene;
+mod scene_file;
 mod stats;
 mod temporary;
 mod terminal;

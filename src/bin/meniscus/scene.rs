@@ -1,17 +1,16 @@
 //! From a particle file to particles as drawn.
 
+use crate::picture::Picture;
 use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
     Class, Ellipsoid, Particles,
     host::{Session, Upload},
-    io::{
-        Budget,
-        particles::{Invalid, check_finite, read_bytes, read_within},
-    },
+    io::particles::{Invalid, check_finite, read_bytes, read_within},
     prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
 };
+use serde::{Deserialize, Serialize};
 use std::{error::Error, path::Path, time::Duration};
 
 /// The dam break that is rendered when no file is named; see assets/README.md.
@@ -33,18 +32,9 @@ pub struct Scene {
     density: Option<DensityField>,
 }
 
-/// Which file, and how to read it.
-pub struct Source<'a> {
-    pub file: Option<&'a Path>,
-    pub radius: Option<f64>,
-    pub splash_threshold: f32,
-    pub drop_invalid: bool,
-    pub budget: Budget,
-    pub prepare: Prepare,
-}
-
 /// Where classes and ellipsoids are made.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Prepare {
     /// On the CPU, before the frame.
     Cpu,
@@ -70,21 +60,22 @@ impl Prepare {
 }
 
 impl Scene {
-    pub fn load(source: &Source) -> Result<Scene, Box<dyn Error>> {
+    /// Reads a particle file, or what is embedded, and prepares it as the picture wants it.
+    pub fn load(picture: &Picture, source: Option<&Path>, prepare: Prepare) -> Result<Scene, Box<dyn Error>> {
         let bar = spinner("reading particles");
-        let path = source.file.unwrap_or(Path::new("embedded dam_break.bgeo"));
-        let mut file = match source.file {
-            Some(path) => read_within(path, &source.budget)?,
-            None => read_bytes(path, EMBEDDED, &source.budget)?,
+        let path = source.unwrap_or(Path::new("embedded dam_break.bgeo"));
+        let mut file = match source {
+            Some(path) => read_within(path, &picture.max_memory)?,
+            None => read_bytes(path, EMBEDDED, &picture.max_memory)?,
         };
-        let policy = if source.drop_invalid { Invalid::Drop } else { Invalid::Reject };
+        let policy = if picture.drop_invalid { Invalid::Drop } else { Invalid::Reject };
         let dropped = check_finite(&mut file, policy, path)?;
         bar.finish_and_clear();
 
         let origin = origin(&file.positions);
         let positions: Vec<Vec3> = file.positions.iter().map(|p| (*p - origin).as_vec3()).collect();
-        let (radius, radius_source) = match (source.radius, file.radius, source.file) {
-            (Some(r), _, _) => (r, "--radius"),
+        let (radius, radius_source) = match (picture.radius, file.radius, source) {
+            (Some(r), _, _) => (r, "given"),
             (None, _, None) => (EMBEDDED_RADIUS, "embedded scene"),
             (None, Some(r), _) => (r, "file"),
             (None, None, _) if positions.is_empty() => (1.0, "no particles"),
@@ -108,11 +99,11 @@ impl Scene {
         let axes: Option<Vec<Mat3>> = file.axes.as_ref().map(|a| a.iter().map(|m| m.as_mat3()).collect());
         let options = Options {
             support: file.support.map(|s| s as f32),
-            splash_threshold: source.splash_threshold,
-            search: source.prepare.search(),
+            splash_threshold: picture.splash_threshold,
+            search: prepare.search(),
             ..Options::default()
         };
-        if source.prepare.on_device() && (classes.is_some() || axes.is_some()) {
+        if prepare.on_device() && (classes.is_some() || axes.is_some()) {
             return Err(
                 "it brings classes or ellipsoids of its own, and --prepare gpu makes them anew: use --prepare cpu"
                     .into(),
@@ -124,8 +115,8 @@ impl Scene {
             classes: classes.as_deref(),
             ellipsoids: axes.as_deref(),
         };
-        let (particles, report, prepare_ms) = make(&input, &options, source.prepare)?;
-        let density = if report.body > 0 || source.prepare.on_device() {
+        let (particles, report, prepare_ms) = make(&input, &options, prepare)?;
+        let density = if report.body > 0 || prepare.on_device() {
             Some(DensityField::new(&positions, radius as f32, &options)?)
         } else {
             None
