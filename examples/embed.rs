@@ -112,22 +112,18 @@ fn main() -> Result<()> {
         let mut slots = (0..IN_FLIGHT).map(|_| slot(&device, &allocator, pool)).collect::<Result<Vec<_>>>()?;
 
         // meniscus borrows all that. An sRGB output receives linear colour, and encodes it.
-        let host = Host {
-            instance: instance.clone(),
-            device: device.clone(),
-            physical_device: physical,
-            queue_family: family,
-            allocator: allocator.clone(),
-            frames_in_flight: IN_FLIGHT as u32,
-            large_points,
-            debug_utils: None,
-        };
+        let mut host = Host::new(instance.clone(), device.clone(), physical, family, allocator.clone());
+        host.frames_in_flight = IN_FLIGHT as u32;
+        host.large_points = large_points;
         let mut renderer = Renderer::new(host, PICTURE)?;
         renderer.resize(SIZE)?;
         let positions = positions();
         let input = prepare::Input { positions: &positions, radius: RADIUS, classes: None, ellipsoids: None };
         renderer.set_particles(&prepare::prepare(&input, &Default::default())?.0)?;
-        let settings = Settings { absorption: Vec3::new(0.9, 0.3, 0.15), ..Settings::default() };
+        let mut settings = Settings::default();
+        settings.liquid.absorption = Vec3::new(0.9, 0.3, 0.15);
+        // At loading time: frames with these settings compile nothing.
+        renderer.warm_up(&settings)?;
 
         for frame in 0..FRAMES {
             // The engine's frame: wait for this slot's last one, record, submit. Only the engine waits.
@@ -144,17 +140,9 @@ fn main() -> Result<()> {
             let camera = Camera::look_at(eye, Vec3::ZERO, Vec3::Y, 0.7, aspect, 0.1);
             draw_scene(&device, s, &camera, &boards(eye));
             // Then the liquid, over the picture of the scene and through it.
-            let input = FrameInput {
-                scene: Some(SceneInput {
-                    color: s.scene.view,
-                    color_layout: READ,
-                    depth: s.depth.view,
-                    depth_layout: READ,
-                    cleared_depth: 1.0,
-                }),
-                background: Background::Host,
-                ..FrameInput::new(frame % IN_FLIGHT, &camera, &settings, s.picture.view)
-            };
+            let input = FrameInput::new(frame % IN_FLIGHT, &camera, &settings, s.picture.view)
+                .scene(SceneInput::new((s.scene.view, READ), (s.depth.view, READ), 1.0))
+                .background(Background::Host);
             renderer.record(s.cmd, &input)?;
             layout(&device, s.cmd, &s.picture, DRAWN, SOURCE);
             let copy = vk::BufferImageCopy::default().image_subresource(layers()).image_extent(extent());

@@ -19,7 +19,7 @@ layout(set = 0, binding = 5, std430) buffer CounterBlock { uint at[]; } counters
 const uint LISTS = 4u; // class * 2 + side
 const uint ITEMS = BLOCK / PARTICLE_GROUP;
 
-uint blocks() { return (frame.particles.x + BLOCK - 1u) / BLOCK; }
+uint blocks() { return (frame.count + BLOCK - 1u) / BLOCK; }
 
 // Which lists a particle is in, as bits.
 uint lists_of(uint i) {
@@ -31,7 +31,7 @@ void main() {
 #ifdef SCAN
     scan_row(gl_WorkGroupID.x, blocks(), LISTS);
 #else
-    uint block = group_index(), count = frame.particles.x;
+    uint block = group_index(), count = frame.count;
     if (block >= blocks()) return;
     uint from = min(block * BLOCK + gl_LocalInvocationIndex * ITEMS, count), to = min(from + ITEMS, count);
     uint mine[LISTS] = uint[](0u, 0u, 0u, 0u);
@@ -61,8 +61,8 @@ void main() {
     // the image, is the same either way.
     if (block == 0u && gl_LocalInvocationIndex < LISTS) {
         uint l = gl_LocalInvocationIndex, n = sums.at[LISTS * blocks() + l];
-        bool quads = (frame.particles.w | counters.at[COUNT_LARGE_SPLASH + l / 2u]) != 0u;
-        draws.at[l] = Draws(uvec4(quads ? 0u : n, 1u, 0u, 0u), uvec4(4u, quads ? n : 0u, 0u, 0u));
+        bool quads = (frame.quads_only | counters.at[COUNT_LARGE_SPLASH + l / 2u]) != 0u;
+        draws.at[l] = Draws(quads ? 0u : n, 1u, 0u, 0u, 4u, quads ? n : 0u, 0u, 0u);
         counters.at[COUNT_SPLASH_FRONT + l] = n;
     }
 #endif

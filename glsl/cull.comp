@@ -11,12 +11,12 @@ layout(local_size_x = PARTICLE_GROUP) in;
 layout(set = 0, binding = 4, std430) readonly buffer BoundBlock { uint at[]; } bounds;
 layout(set = 0, binding = 5, std430) buffer VisibleBlock { uint at[]; } visible;
 layout(set = 0, binding = 6, std430) buffer CounterBlock { uint at[]; } counters;
-layout(constant_id = 0) const bool OCCLUSION = true;
-layout(constant_id = 1) const bool BACK = true;
+layout(constant_id = 0) const bool OCCLUSION_CULLING = true;
+layout(constant_id = 1) const bool BACK_SIDES = true;
 
 void main() {
     uint i = invocation();
-    if (i >= frame.particles.x) return;
+    if (i >= frame.count) return;
     Particle p;
     int cls;
     if (!particle(i, p, cls) || repeats(i)) {
@@ -26,19 +26,19 @@ void main() {
     Ellipsoid e = to_eye(p);
     vec4 box = pixel_bounds(e);
     ivec2 lo = ivec2(ceil(box.xy - 0.5)), hi = ivec2(floor(box.zw - 0.5));
-    uint wanted = BACK ? (VISIBLE_FRONT | VISIBLE_BACK) : VISIBLE_FRONT;
+    uint wanted = BACK_SIDES ? (VISIBLE_FRONT | VISIBLE_BACK) : VISIBLE_FRONT;
     uint verdict = all(lessThanEqual(lo, hi)) ? wanted : 0u;
     float near = -e.center.z - sqrt(e.sd.z), far = -e.center.z + sqrt(e.sd.z);
     // Few particles are larger than 64 pixels, and those show; walking their pixels would cost more than drawing them.
-    if (OCCLUSION && cls == CLASS_BODY && verdict != 0u && near > frame.viewport.z && all(lessThan(hi - lo, ivec2(LARGE)))) {
+    if (OCCLUSION_CULLING && cls == CLASS_BODY && verdict != 0u && near > frame.near && all(lessThan(hi - lo, ivec2(LARGE)))) {
         verdict = 0u;
-        uint width = uint(frame.viewport.x), pixels = width * uint(frame.viewport.y);
+        uint width = uint(frame.size.x), pixels = width * uint(frame.size.y);
         Cast c = cast_of(e);
         uint front = floatBitsToUint(max(near - DEPTH_ROUNDING, 0.0)), back = floatBitsToUint(far + DEPTH_ROUNDING);
         for (int y = lo.y; y <= hi.y && verdict != wanted; ++y) {
             for (int x = lo.x; x <= hi.x && verdict != wanted; ++x) {
                 uint pixel = uint(y) * width + uint(x);
-                bool may_front = front <= bounds.at[pixel], may_back = BACK && back >= bounds.at[pixels + pixel];
+                bool may_front = front <= bounds.at[pixel], may_back = BACK_SIDES && back >= bounds.at[pixels + pixel];
                 if (!may_front && !may_back) continue;
                 // Only then the surface itself.
                 float nearer, farther;
@@ -51,5 +51,5 @@ void main() {
     visible.at[i] = verdict | (cls == CLASS_BODY ? VISIBLE_BODY : 0u);
     // One pixel more than the box, for the centre's rounding.
     float size = max(box.z - box.x, box.w - box.y) + 1.0;
-    if (verdict != 0u && size > float(frame.particles.z)) atomicAdd(counters.at[COUNT_LARGE_SPLASH + cls], 1u);
+    if (verdict != 0u && size > float(frame.largest_point)) atomicAdd(counters.at[COUNT_LARGE_SPLASH + cls], 1u);
 }

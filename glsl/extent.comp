@@ -1,5 +1,5 @@
-// The box of all positions, and what follows from it: the frame's bounds and search limits, the cells it occupies, how many
-// bits of them the sort has to look at, and so how many of its passes run. REDUCE runs over the particles, PLAN once.
+// The box of all positions, and what follows from it: the frame's origin and bounds, the cells it occupies, how many bits of
+// them the sort has to look at, and so how many of its passes run. REDUCE runs over the particles, PLAN once.
 #version 460
 // Compiled with one of: REDUCE, PLAN
 #extension GL_GOOGLE_include_directive : require
@@ -23,7 +23,7 @@ shared uint box[6];
 void main() {
     if (gl_LocalInvocationIndex < 6u) box[gl_LocalInvocationIndex] = gl_LocalInvocationIndex < 3u ? 0xffffffffu : 0u;
     barrier();
-    uint block = group_index(), count = prepare.source.x, lost = 0u;
+    uint block = group_index(), count = prepare.count, lost = 0u;
     uvec3 least = uvec3(0xffffffffu), most = uvec3(0u);
     for (uint k = 0u; k < BLOCK / PARTICLE_GROUP; ++k) {
         uint i = block * BLOCK + k * PARTICLE_GROUP + gl_LocalInvocationIndex;
@@ -56,10 +56,10 @@ void main() {
         high = vec3(unordered(extent.at[3]), unordered(extent.at[4]), unordered(extent.at[5]));
     }
     // The table enters particles into the cells around theirs, too.
-    int more = RELATION ? 1 : 0;
+    int more = RELATION_TABLE ? 1 : 0;
     uint bits = 0u;
     for (int a = 0; a < 3; ++a) {
-        int first = cell_of(low[a], prepare.lengths.x) - more, last = cell_of(high[a], prepare.lengths.x) + more;
+        int first = cell_of(low[a], prepare.cell_edge) - more, last = cell_of(high[a], prepare.cell_edge) + more;
         extent.at[EXTENT_FIRST_CELL + a] = uint(first);
         extent.at[EXTENT_LAST_CELL + a] = uint(last - more);
         uint axis = uint(findMSB(uint(last - first)) + 1);
@@ -78,22 +78,14 @@ void main() {
         extent.at[at + 4u] = 1u;
         extent.at[at + 5u] = 1u;
     }
-    // The liquid's own space: a particle's place is the origin (src/space.rs).
-    vec3 origin = position(prepare.source.x / 2u);
+    // The liquid's own space: one particle's position is its origin (src/space.rs).
+    vec3 origin = position(prepare.count / 2u);
     if (!finite(origin)) origin = 0.5 * low + 0.5 * high;
     for (int a = 0; a < 3; ++a) extent.at[EXTENT_ORIGIN + a] = floatBitsToUint(origin[a]);
-    float unit = 1.0 / prepare.lengths.y, room = max(prepare.shape.z, 1.0);
+    float unit = 1.0 / prepare.radius, room = max(prepare.longest_axis, 1.0);
     frame.view[3].xyz = unit * (mat3(frame.view) * origin + frame.view[3].xyz);
-    // What Camera::uniforms makes of the same box, with room for ellipsoids around the outermost centres.
-    low = unit * (low - origin) - room;
-    high = unit * (high - origin) + room;
-    float middle = length((frame.view * vec4(0.5 * (low + high), 1.0)).xyz);
-    float pixel = middle / max(abs(frame.to_pixel.x), abs(frame.to_pixel.y));
-    float converged = max(1e-3, 1e-6 * (middle + 0.5 * length(high - low)));
-    frame.search.x = converged;
-    frame.search.y = max(max(ACCEPTED, ACCEPTED_PIXELS * pixel), converged);
-    frame.search.z = max(JUMP, STEEP * pixel);
-    frame.bounds_min = vec4(low, 0.0);
-    frame.bounds_max = vec4(high, 0.0);
+    // Room for ellipsoids around the outermost centres.
+    frame.bounds_min = unit * (low - origin) - room;
+    frame.bounds_max = unit * (high - origin) + room;
 }
 #endif

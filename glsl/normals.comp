@@ -1,6 +1,7 @@
 // Normals of the smoothed body surface: one-sided differences of eye-space positions, on each axis the side with the
 // smaller depth jump (Green10). Fronts face the viewer, backs face away.
 #version 460
+// Compiled with any of: RAW
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
@@ -8,12 +9,14 @@
 #include "normal.glsl"
 layout(local_size_x = IMAGE_GROUP, local_size_y = IMAGE_GROUP) in;
 layout(set = 0, binding = 1) uniform texture2DArray depth_in;
-layout(set = 0, binding = 2) uniform utexture2DArray normal_raw;
+#ifdef RAW
+layout(set = 0, binding = 2) uniform utexture2DArray normal_raw; // where differences say nothing
+#endif
 layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2DArray normal_out;
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 
 float depth_at(ivec2 p, int layer) {
-    if (any(lessThan(p, ivec2(0))) || any(greaterThanEqual(p, ivec2(frame.viewport.xy)))) return 0.0;
+    if (any(lessThan(p, ivec2(0))) || any(greaterThanEqual(p, ivec2(frame.size)))) return 0.0;
     return texelFetch(depth_in, ivec3(p, layer), 0).x;
 }
 
@@ -22,15 +25,15 @@ vec3 tangent(ivec2 pixel, ivec2 step, int layer, float d, vec3 v) {
     float before = depth_at(pixel - step, layer), after = depth_at(pixel + step, layer);
     bool forward = after > 0.0 && (before <= 0.0 || abs(after - d) <= abs(before - d));
     if (!forward && before <= 0.0) return vec3(0.0);
-    float other = forward ? after : before, sign = forward ? 1.0 : -1.0;
-    // other (v +- step) - d v, without the cancellation
-    return sign * ((other - d) * v) + vec3(other * vec2(step) / frame.to_pixel.xy, 0.0);
+    float neighbour = forward ? after : before, sign = forward ? 1.0 : -1.0;
+    // neighbour (v +- step) - d v, without the cancellation
+    return sign * ((neighbour - d) * v) + vec3(neighbour * vec2(step) / frame.pixel_scale, 0.0);
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     int layer = int(gl_WorkGroupID.z);
-    if (any(greaterThanEqual(pixel, ivec2(frame.viewport.xy)))) return;
+    if (any(greaterThanEqual(pixel, ivec2(frame.size)))) return;
     float d = depth_at(pixel, layer);
     uint result = 0u;
     if (d > 0.0) {
@@ -41,7 +44,11 @@ void main() {
             float away = dot(n, v);
             result = encode_normal(n * (((away > 0.0) == (layer == SIDE_BACK)) ? 1.0 / size : -1.0 / size));
         } else {
+#ifdef RAW
             result = texelFetch(normal_raw, ivec3(pixel, layer), 0).x;
+#else
+            result = encode_normal((layer == SIDE_BACK ? 1.0 : -1.0) * normalize(v));
+#endif
             atomicAdd(counters.at[COUNT_NORMAL_DEGENERATE], 1u);
         }
     }

@@ -18,16 +18,16 @@ void main() {
     uint i = invocation();
     Particle p;
     int cls;
-    if (i >= frame.particles.x || !particle(i, p, cls) || cls != CLASS_BODY || repeats(i)) return;
+    if (i >= frame.count || !particle(i, p, cls) || cls != CLASS_BODY || repeats(i)) return;
     Ellipsoid e = to_eye(p);
     float near = -e.center.z - sqrt(e.sd.z), far = -e.center.z + sqrt(e.sd.z);
-    if (near <= frame.viewport.z) return;
+    if (near <= frame.near) return;
     vec4 box = pixel_bounds(e);
     ivec2 lo = ivec2(ceil(box.xy - 0.5)), hi = ivec2(floor(box.zw - 0.5));
     // Few particles are larger than 64 pixels, and those hide little that others do not.
     if (any(greaterThanEqual(hi - lo, ivec2(LARGE)))) return;
     Cast c = cast_of(e);
-    uint width = uint(frame.viewport.x), pixels = width * uint(frame.viewport.y);
+    uint width = uint(frame.size.x), pixels = width * uint(frame.size.y);
     for (int y = lo.y; y <= hi.y; ++y) {
         for (int x = lo.x; x <= hi.x; ++x) {
             uint pixel = uint(y) * width + uint(x);

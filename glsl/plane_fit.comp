@@ -9,22 +9,23 @@
 #include "frame.glsl"
 #include "normal.glsl"
 layout(local_size_x_id = 0, local_size_y_id = 1) in; // a square tile
-layout(constant_id = 2) const int REACH = 4; // window = 2 REACH + 1 pixels
+layout(constant_id = 2) const int HALF_WINDOW = 4; // window = 2 HALF_WINDOW + 1 pixels
 layout(constant_id = 3) const bool EUCLIDEAN = false; // weights of |p_i - p_j| instead of eq. (2)
+layout(push_constant) uniform PushBlock { float sigma; } push; // of eq. (2), in particle radii
 layout(set = 0, binding = 1) uniform texture2DArray depth_in;
 layout(set = 0, binding = 2) uniform utexture2DArray normal_raw;
 layout(set = 0, binding = 3, r32f) uniform writeonly image2DArray depth_out;
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 
 const int TILE = int(gl_WorkGroupSize.x);
-const int EDGE = TILE + 2 * REACH;
+const int EDGE = TILE + 2 * HALF_WINDOW;
 shared vec4 tile[EDGE * EDGE]; // raw normal, depth (0: no surface)
 shared uint occupied;
 
 void main() {
-    ivec2 size = ivec2(frame.viewport.xy);
+    ivec2 size = ivec2(frame.size);
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 origin = ivec2(gl_WorkGroupID.xy) * TILE - REACH;
+    ivec2 origin = ivec2(gl_WorkGroupID.xy) * TILE - HALF_WINDOW;
     int layer = int(gl_WorkGroupID.z);
     if (gl_LocalInvocationIndex == 0u) occupied = 0u;
     float own = 0.0; // negative (the eye is inside) and zero (nothing) pass through unchanged
@@ -53,15 +54,15 @@ void main() {
     }
 
     vec3 v = view_ray(vec2(pixel) + 0.5);
-    vec2 step = 1.0 / frame.to_pixel.xy;
-    float inverse = 1.0 / (frame.smoothing.x * frame.smoothing.x);
-    ivec2 home = ivec2(gl_LocalInvocationID.xy) + REACH;
+    vec2 step = 1.0 / frame.pixel_scale;
+    float inverse = 1.0 / (push.sigma * push.sigma);
+    ivec2 home = ivec2(gl_LocalInvocationID.xy) + HALF_WINDOW;
     vec3 normal = vec3(0.0);
     vec2 lateral = vec2(0.0); // sum of w d_j (v_j - v_i)
     float along = 0.0;        // sum of w (d_j - d_i)
     float total = 0.0;
-    for (int y = -REACH; y <= REACH; ++y) {
-        for (int x = -REACH; x <= REACH; ++x) {
+    for (int y = -HALF_WINDOW; y <= HALF_WINDOW; ++y) {
+        for (int x = -HALF_WINDOW; x <= HALF_WINDOW; ++x) {
             vec4 entry = tile[(home.y + y) * EDGE + home.x + x];
             if (entry.w <= 0.0) continue;
             float rise = entry.w - own;
@@ -87,9 +88,9 @@ void main() {
         vec3 n = normal / length_sum;
         float facing = dot(n, v);
         float update = (dot(n.xy, lateral) + facing * along) / (facing * total);
-        if (abs(facing) < frame.smoothing.z * length(v)) {
+        if (abs(facing) < FIT_GRAZING_LIMIT * length(v)) {
             atomicAdd(counters.at[COUNT_FIT_GRAZING], 1u);
-        } else if (!(abs(update) <= frame.smoothing.y) || own + update < frame.viewport.z) {
+        } else if (!(abs(update) <= FIT_UPDATE_LIMIT * push.sigma) || own + update < frame.near) {
             atomicAdd(counters.at[COUNT_FIT_UNBOUNDED], 1u);
         } else {
             result = own + update;

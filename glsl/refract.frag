@@ -44,139 +44,184 @@ layout(location = 2) out vec4 out_direction; // world space; w: surfaces whose n
 #include "search.glsl"
 #include "background.glsl"
 
-void finish(vec3 color, int pattern, int outcome, float hits, float length_inside, vec3 direction, float flipped) {
+// How far a pixel's view ray has come.
+struct Walk {
+    vec3 x; // eye space
+    vec3 dir;
+    vec3 color; // gathered so far
+    vec3 light; // fraction of what the ray brings back from here on that reaches the eye
+    float hits;
+    float length_inside;
+    float flipped; // surfaces whose normal faced the wrong way
+    int cls;       // of the volume it is in, or enters
+    int second;    // class of the second volume, or -1
+    int outcome;
+    int doubt; // why a walk that met every surface may have missed one, or OUTCOME_HIT
+    uint bounces;
+    ivec2 scene_pixel; // where it ended on the scene
+};
+
+void write_pixel(vec3 color, int pattern, int outcome, Walk w) {
     out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
 #ifdef DEBUG
-    out_walk = vec4(float(pattern), float(outcome), hits, length_inside);
-    out_direction = vec4(transpose(mat3(frame.view)) * direction, flipped);
+    out_walk = vec4(float(pattern), float(outcome), w.hits, w.length_inside);
+    out_direction = vec4(transpose(mat3(frame.view)) * w.dir, w.flipped);
 #endif
+}
+
+void note_doubt(inout Walk w, int why) { w.doubt = w.doubt == OUTCOME_HIT ? why : w.doubt; }
+
+// Turns a normal to where it has to face.
+void face(inout Walk w, inout vec3 n, bool wrong) {
+    if (wrong) {
+        n = -n;
+        w.flipped += 1.0;
+    }
+}
+
+// Depth of the first surface at a pixel, the nearer of both fronts, and its class; not above 0 where there is no liquid.
+// Where liquid surrounds the eye, the ray starts `inside`, at the near plane.
+float first_surface(ivec2 pixel, out int cls, out bool inside) {
+    float splash = HAS_SPLASH ? map_depth(CLASS_SPLASH, SIDE_FRONT, pixel) : 0.0;
+    float body = HAS_BODY ? map_depth(CLASS_BODY, SIDE_FRONT, pixel) : 0.0;
+    // Negative: the near plane lies inside that class. The eye is inside the body where the host says so.
+    bool body_around = false;
+    if (HAS_BODY) body_around = frame.eye_inside * (REFRACTIONS == 1 ? 1.0 : map_depth(CLASS_BODY, SIDE_BACK, pixel)) > 0.0;
+    inside = body_around || body < 0.0 || splash < 0.0;
+    cls = body_around || body < 0.0 ? CLASS_BODY : CLASS_SPLASH;
+    float depth = frame.near;
+    if (!inside) {
+        cls = splash > 0.0 && (body <= 0.0 || splash <= body) ? CLASS_SPLASH : CLASS_BODY;
+        depth = cls == CLASS_SPLASH ? splash : body;
+    }
+    return depth;
+}
+
+// Eq. (6): what is reflected at a front surface is gathered, what is refracted goes on.
+void enter(inout Walk w, vec3 n) {
+    face(w, n, dot(w.dir, n) > 0.0);
+    float air = -dot(w.dir, n);
+    vec3 bent = refract(w.dir, n, 1.0 / frame.ior);
+    float reflected = fresnel(air, -dot(bent, n), frame.ior, EXACT_FRESNEL);
+    w.color += w.light * reflected * background(w.x, reflect(w.dir, n));
+    w.light *= 1.0 - reflected;
+    w.dir = bent;
+    w.hits += 1.0;
+}
+
+// Follows the ray inside up to a wall, whose normal is n, or to where it ends otherwise; eq. (9) for this interval.
+void run_inside(inout Walk w, int came_from, out int side, out vec3 n) {
+    float t;
+    int found = find_exit(trace(w.x, w.dir), w.cls, came_from, t, side);
+    t = max(t, 0.0); // the last step onto a wall at hand may round to before it
+    if (found == OUTCOME_PAST_JUMP || found == OUTCOME_OPPOSITE_WALL) {
+        note_doubt(w, found);
+        found = OUTCOME_HIT;
+    }
+    w.outcome = found;
+    bool whole = true;
+    n = w.dir;
+    if (w.outcome == OUTCOME_HIT) n = sample_normal(w.cls, side, project(w.x + t * w.dir), whole);
+#ifdef SCENE
+    // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
+    float t_scene, gap = w.outcome == OUTCOME_HIT ? WETTING_GAP / max(abs(dot(w.dir, n)), WETTING_FLAT) : 0.0;
+    if (meets_scene(in_view(w.x, w.dir, t + gap), t_scene, w.scene_pixel)) {
+        t = t_scene;
+        w.outcome = OUTCOME_SCENE;
+    }
+#endif
+    w.x += t * w.dir;
+    w.length_inside += t;
+    w.light *= exp(-frame.absorption * t);
+    if (w.outcome == OUTCOME_HIT && !whole) note_doubt(w, OUTCOME_PAST_JUMP);
+}
+
+// Eqs. (7) and (8): refracts out through a wall, or reflects all light beyond the critical angle. Returns whether the ray
+// is outside now.
+bool leave(inout Walk w, vec3 n) {
+    w.hits += 1.0;
+    face(w, n, dot(w.dir, n) < 0.0);
+    vec3 bent = refract(w.dir, -n, frame.ior), mirrored = reflect(w.dir, -n);
+    bool outside = dot(bent, bent) > 0.0;
+    if (outside) {
+        float reflected = fresnel(dot(bent, n), dot(w.dir, n), frame.ior, EXACT_FRESNEL);
+        w.color += w.light * reflected * background(w.x, mirrored);
+        w.light *= 1.0 - reflected;
+        w.dir = bent;
+    } else {
+        w.dir = mirrored;
+        if (w.bounces == INTERNAL_REFLECTIONS) w.outcome = OUTCOME_REFLECTION_LIMIT;
+        ++w.bounces;
+    }
+    return outside;
+}
+
+// Through a volume, from wall to wall, until the ray leaves it or ends.
+void cross_volume(inout Walk w) {
+    int came_from = -1;
+    bool outside = false;
+    while (!outside && w.outcome == OUTCOME_HIT) {
+        int side;
+        vec3 n;
+        run_inside(w, came_from, side, n);
+        if (w.outcome != OUTCOME_HIT) break;
+        outside = leave(w, n);
+        came_from = side;
+    }
+}
+
+// To the front of a second volume. False where the ray meets none.
+bool reach_second(inout Walk w) {
+    float t;
+    int found;
+    bool jumped;
+    int next = find_entry(trace(w.x, w.dir), t, found, jumped);
+#ifdef SCENE
+    float t_scene;
+    if (next >= 0 && meets_scene(in_view(w.x, w.dir, t), t_scene, w.scene_pixel)) {
+        w.outcome = OUTCOME_SCENE;
+        return false;
+    }
+#endif
+    if (jumped) note_doubt(w, OUTCOME_PAST_JUMP);
+    if (next < 0) {
+        w.outcome = found;
+        return false;
+    }
+    w.x += t * w.dir;
+    w.cls = w.second = next;
+    return true;
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec3 v = view_ray(gl_FragCoord.xy), dir = normalize(v);
-    float ior = frame.search.w, near = frame.viewport.z;
-    float splash = HAS_SPLASH ? map_depth(CLASS_SPLASH, SIDE_FRONT, pixel) : 0.0;
-    float body = HAS_BODY ? map_depth(CLASS_BODY, SIDE_FRONT, pixel) : 0.0;
-
-    // Negative: the near plane lies inside that class. The eye is inside the body where the host says so.
-    bool body_around = false;
-    if (HAS_BODY) body_around = frame.scene.w * (REFRACTIONS == 1 ? 1.0 : map_depth(CLASS_BODY, SIDE_BACK, pixel)) > 0.0;
-    bool inside = body_around || body < 0.0 || splash < 0.0;
-    int cls = body_around || body < 0.0 ? CLASS_BODY : CLASS_SPLASH;
-    float depth = near;
-    if (!inside) {
-        cls = splash > 0.0 && (body <= 0.0 || splash <= body) ? CLASS_SPLASH : CLASS_BODY;
-        depth = cls == CLASS_SPLASH ? splash : body;
-    }
+    int first;
+    bool inside;
+    float depth = first_surface(pixel, first, inside);
+    Walk w = Walk(depth * v, dir, vec3(0.0), vec3(1.0), 0.0, 0.0, 0.0, first, -1, OUTCOME_HIT, OUTCOME_HIT, 0u, pixel);
     if (depth <= 0.0 || scene_hides(pixel, depth)) {
         if (HOST_BACKGROUND) discard;
-        finish(behind(pixel, dir), PATTERN_NONE, OUTCOME_NO_LIQUID, 0.0, 0.0, dir, 0.0);
+        write_pixel(behind(pixel, dir), PATTERN_NONE, OUTCOME_NO_LIQUID, w);
         return;
     }
 
-    vec3 x = depth * v, color = vec3(0.0), light = vec3(1.0);
-    float hits = 0.0, length_inside = 0.0, flipped = 0.0;
-    int outcome = OUTCOME_HIT, doubt = OUTCOME_HIT, first = cls, second = -1;
-    uint bounces = 0u;
-    bool entering = !inside;
-#ifdef SCENE
-    ivec2 met; // where the ray ended on the scene
-#endif
     const uint volumes = REFRACTIONS == 1 ? 1u : REFRACTIONS / 2u;
-    for (uint volume = 0u; volume < volumes && outcome == OUTCOME_HIT; ++volume) {
-        if (entering) {
-            bool smooth_here;
-            vec3 n = volume == 0u ? map_normal(cls, SIDE_FRONT, pixel) : sample_normal(cls, SIDE_FRONT, project(x), smooth_here);
-            if (dot(dir, n) > 0.0) {
-                n = -n;
-                flipped += 1.0;
-            }
-            float air = -dot(dir, n);
-            vec3 bent = refract(dir, n, 1.0 / ior);
-            float share = fresnel(air, -dot(bent, n), ior, EXACT_FRESNEL);
-            color += light * share * background(x, reflect(dir, n));
-            light *= 1.0 - share;
-            dir = bent;
-            hits += 1.0;
+    for (uint volume = 0u; volume < volumes && w.outcome == OUTCOME_HIT; ++volume) {
+        if (volume > 0u || !inside) {
+            bool whole;
+            enter(w, volume == 0u ? map_normal(w.cls, SIDE_FRONT, pixel) : sample_normal(w.cls, SIDE_FRONT, project(w.x), whole));
         }
-        entering = true;
         if (REFRACTIONS == 1) break;
-
-        int came_from = -1;
-        bool outside = false;
-        while (!outside && outcome == OUTCOME_HIT) {
-            float t;
-            int side;
-            int found = find_exit(trace(x, dir), cls, came_from, t, side);
-            t = max(t, 0.0); // the last step onto a wall at hand may round to before it
-            if (found == OUTCOME_PAST_JUMP || found == OUTCOME_OTHER_WALL) {
-                doubt = doubt == OUTCOME_HIT ? found : doubt;
-                found = OUTCOME_HIT;
-            }
-            outcome = found;
-            bool smooth_here = true;
-            vec3 n = dir;
-            if (outcome == OUTCOME_HIT) n = sample_normal(cls, side, project(x + t * dir), smooth_here);
-#ifdef SCENE
-            // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
-            float t_scene, gap = outcome == OUTCOME_HIT ? WETTED / max(abs(dot(dir, n)), WETTED_FLAT) : 0.0;
-            if (meets_scene(in_view(x, dir, t + gap), t_scene, met)) {
-                t = t_scene;
-                outcome = OUTCOME_SCENE;
-            }
-#endif
-            x += t * dir;
-            length_inside += t;
-            light *= exp(-frame.absorption.rgb * t);
-            if (outcome != OUTCOME_HIT) break;
-            hits += 1.0;
-            if (!smooth_here && doubt == OUTCOME_HIT) doubt = OUTCOME_PAST_JUMP;
-            if (dot(dir, n) < 0.0) {
-                n = -n;
-                flipped += 1.0;
-            }
-            vec3 bent = refract(dir, -n, ior), mirrored = reflect(dir, -n);
-            if (dot(bent, bent) > 0.0) {
-                float share = fresnel(dot(bent, n), dot(dir, n), ior, EXACT_FRESNEL);
-                color += light * share * background(x, mirrored);
-                light *= 1.0 - share;
-                dir = bent;
-                outside = true;
-            } else {
-                // Beyond the critical angle all of it stays inside.
-                dir = mirrored;
-                came_from = side;
-                if (bounces == INTERNAL_REFLECTIONS) outcome = OUTCOME_REFLECTION_LIMIT;
-                ++bounces;
-            }
-        }
-        if (outcome != OUTCOME_HIT || volume + 1u == volumes) break;
-
-        float t;
-        int found;
-        bool jumped;
-        int next = find_entry(trace(x, dir), t, found, jumped);
-#ifdef SCENE
-        float t_scene;
-        if (next >= 0 && meets_scene(in_view(x, dir, t), t_scene, met)) {
-            outcome = OUTCOME_SCENE;
-            break;
-        }
-#endif
-        if (jumped && doubt == OUTCOME_HIT) doubt = OUTCOME_PAST_JUMP;
-        if (next < 0) {
-            outcome = found;
-            break;
-        }
-        x += t * dir;
-        cls = second = next;
+        cross_volume(w);
+        if (w.outcome != OUTCOME_HIT || volume + 1u == volumes) break;
+        if (!reach_second(w)) break;
     }
 #ifdef SCENE
-    if (outcome == OUTCOME_SCENE) color += light * scene_light(met);
+    if (w.outcome == OUTCOME_SCENE) w.color += w.light * scene_light(w.scene_pixel);
     else
 #endif
-    color += light * background(x, dir);
-    int pattern = second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + second;
-    finish(color, pattern, outcome == OUTCOME_HIT ? doubt : outcome, hits, length_inside, dir, flipped);
+    w.color += w.light * background(w.x, w.dir);
+    int pattern = w.second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + w.second;
+    write_pixel(w.color, pattern, w.outcome == OUTCOME_HIT ? w.doubt : w.outcome, w);
 }

@@ -3,7 +3,7 @@
 // together, one a component: what is looked up and read once serves all. Candidates are tested exactly, so that neighbours are
 // the same set however they are found.
 //
-// Sorted cells: cells as wide as the support, so 5 x 5 runs of 5 cells. RELATION: one run of the relation table, whose
+// Sorted cells: cells as wide as the support, so 5 x 5 runs of 5 cells. RELATION_TABLE: one run of the relation table, whose
 // cells are as wide as the reach.
 #version 460
 // Compiled with any of: NEIGHBOURS
@@ -16,7 +16,7 @@ layout(set = 0, binding = 3, std430) readonly buffer OrderBlock { uint at[]; } o
 layout(set = 0, binding = 4, std430) readonly buffer SortedBlock { float at[]; } sorted;
 layout(set = 0, binding = 5, std430) writeonly buffer CenterBlock { float at[]; } centers;
 layout(set = 0, binding = 6, std430) writeonly buffer DiagonalBlock { float at[]; } diagonals;
-layout(set = 0, binding = 7, std430) writeonly buffer MixedBlock { float at[]; } mixed_parts;
+layout(set = 0, binding = 7, std430) writeonly buffer MixedBlock { float at[]; } mixed;
 layout(set = 0, binding = 8, std430) buffer CounterBlock { uint at[]; } counters;
 layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_classes; // 0 splash, 1 body, by input index
 #ifdef NEIGHBOURS
@@ -24,45 +24,45 @@ layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[
 #endif
 layout(constant_id = 1) const bool KEEP_CLASSES = false;
 
-uint count() { return prepare.source.x; }
+uint count() { return prepare.count; }
 vec3 sorted_position(uint k) { return vec3(sorted.at[3u * k], sorted.at[3u * k + 1u], sorted.at[3u * k + 2u]); }
-uint order_at(uint place) {
+uint entry_at(uint rank) { // the sort's result
     uint passes = extent.at[EXTENT_PASSES];
-    return passes == 0u ? place : order.at[half_before(passes) + place];
+    return passes == 0u ? rank : order.at[half_before(passes) + rank];
 }
-uint input_index(uint k) { return RELATION ? k : order_at(k); }
+uint input_index(uint k) { return RELATION_TABLE ? k : entry_at(k); }
 
 #ifdef NEIGHBOURS
-// A particle's share: its index, how many neighbours it has, and those of them that there is room for.
-uint share() { return neighbours.at.length() / count(); }
-void list(uint k, uint number) {
-    neighbours.at[k * share()] = input_index(k);
-    neighbours.at[k * share() + 1u] = number;
+// Words of a particle's list: its index, how many neighbours it has, and those of them that there is room for.
+uint list_words() { return neighbours.at.length() / count(); }
+void begin_list(uint k, uint number) {
+    neighbours.at[k * list_words()] = input_index(k);
+    neighbours.at[k * list_words() + 1u] = number;
 }
 #endif
 
-ivec3 place_cell(uint place) {
-    if (!RELATION) return cell_of(sorted_position(place));
-    uint entry = order_at(place);
+ivec3 cell_at(uint rank) {
+    if (!RELATION_TABLE) return cell_of(sorted_position(rank));
+    uint entry = entry_at(rank);
     return cell_of(sorted_position(entry / 27u)) + entry_offset(entry);
 }
 
 bool before(ivec3 a, ivec3 b) { return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z; }
 
-// First place whose cell is not before c (`inclusive`: not before or equal to).
+// First rank, not before `low`, whose cell is not before c; with `inclusive`, whose cell is after c.
 uint search(ivec3 c, bool inclusive, uint low) {
     uint high = entries();
     while (low < high) {
         uint middle = low + (high - low) / 2u;
-        ivec3 m = place_cell(middle);
+        ivec3 m = cell_at(middle);
         if (before(m, c) || (inclusive && m == c)) low = middle + 1u;
         else high = middle;
     }
     return low;
 }
 
-// The same among keys of one word: first place, not before `low`, whose key is not smaller than `key`. What is looked for is
-// mostly near: strides grow from there.
+// The same among keys of one word: first rank, not before `low`, whose key is not smaller than `key`. It is mostly near, so
+// strides grow from there.
 uint search_key(uint key, uint low) {
     uint keys = free_half(), reach = 8u;
     while (low + reach < count() && order.at[keys + low + reach] < key) {
@@ -78,10 +78,10 @@ uint search_key(uint key, uint low) {
     return low;
 }
 
-// The run of places in the cells from `from` to `to`, which differ in z alone; it does not begin before `low`. Only of
-// particles, and only where keys are one word, are there keys to look in.
+// The run of ranks in the cells from `from` to `to`, which differ in z alone; it does not begin before `low`. Keys are there
+// to look in only of particles, and only where a key is one word.
 uvec2 run_of(ivec3 from, ivec3 to, uint low) {
-    if (RELATION || key_bits() > 32u) {
+    if (RELATION_TABLE || key_bits() > 32u) {
         uint begin = search(from, false, low);
         return uvec2(begin, search(to, true, begin));
     }
@@ -94,15 +94,15 @@ uvec2 run_of(ivec3 from, ivec3 to, uint low) {
     return uvec2(begin, key == 0xffffffffu ? count() : search_key(key + 1u, begin));
 }
 
-// In a crowd, every how many of its candidates one stands for all.
+// How many candidates of a run one of them stands for: 1 but in a crowd.
 uint step_of(uvec2 run) {
-    const uint most = RELATION ? CROWD_RELATION : CROWD;
+    const uint most = RELATION_TABLE ? CROWD_RELATION : CROWD;
     return max((run.y - run.x + most - 1u) / most, 1u);
 }
 
 // Whether b - a is shorter than the reach: ties of float32 decided to 2^-45 of the square.
 bool nearer(vec3 a, vec3 b) {
-    float reach = prepare.lengths.w;
+    float reach = prepare.reach;
     vec2 x = two_sum(b.x, -a.x), y = two_sum(b.y, -a.y), z = two_sum(b.z, -a.z);
     vec2 xx = two_product(x.x, x.x), yy = two_product(y.x, y.x), zz = two_product(z.x, z.x), rr = two_product(reach, reach);
     vec2 s = two_sum(xx.x, yy.x), t = two_sum(s.x, zz.x);
@@ -157,10 +157,10 @@ struct Sums {
 
 // Adds what is near, `many` times; a choice of numbers costs less than a branch that neighbouring invocations take differently.
 void add(inout Sums s, bvec4 near, uint many, Vectors o, vec4 squared) {
-    vec4 d = sqrt(mix(vec4(prepare.lengths.w * prepare.lengths.w), squared, near));
-    vec4 q = d * (1.0 / prepare.lengths.w), w = float(many) * mix(vec4(0.0), 1.0 - q * q * q, near);
+    vec4 d = sqrt(mix(vec4(prepare.reach * prepare.reach), squared, near));
+    vec4 q = d * (1.0 / prepare.reach), w = float(many) * mix(vec4(0.0), 1.0 - q * q * q, near);
     s.number += many * uvec4(near);
-    s.density += float(many) * spline(d * (1.0 / prepare.lengths.z));
+    s.density += float(many) * spline(d * (1.0 / prepare.support));
     s.weight += w;
     vec4 x = w * o.x, y = w * o.y, z = w * o.z;
     s.first.x += x;
@@ -178,57 +178,170 @@ void write(uint k, vec3 center, vec3 diagonal, vec3 mixed_part) {
     for (uint a = 0u; a < 3u; ++a) {
         centers.at[3u * k + a] = center[a];
         diagonals.at[3u * k + a] = diagonal[a];
-        mixed_parts.at[3u * k + a] = mixed_part[a];
+        mixed.at[3u * k + a] = mixed_part[a];
     }
 }
 
-const uint LARGEST_RUNS = 25u;
+// What has been counted here, added up once at the end.
 uint tally[COUNTERS - COUNT_SPLASH];
 void note(uint what) { ++tally[what - COUNT_SPLASH]; }
 
-// Class and ellipsoid of particle k at x from its sums, those of component b.
-void finish(uint k, vec3 x, Sums s, uint b) {
-    vec3 origin = uintBitsToFloat(uvec3(extent.at[EXTENT_ORIGIN], extent.at[EXTENT_ORIGIN + 1], extent.at[EXTENT_ORIGIN + 2]));
-    float unit = 1.0 / prepare.lengths.y;
-    vec3 center = unit * (x - origin);
-    float relative = s.density[b] / prepare.classes.z;
-    bool body = relative >= prepare.classes.x;
+// Whether particle k, of this fraction of a filled body's density, belongs to the body; keeps its class for the next frame.
+bool classify(uint k, float relative) {
+    bool body = relative >= prepare.splash_below;
     if (KEEP_CLASSES) {
         uint i = input_index(k);
-        uint last = max(last_classes.at[i], 1u - prepare.options.z); // without last classes as if all had been body
-        body = body && (relative >= prepare.classes.y || last != 0u);
+        uint last = max(last_classes.at[i], 1u - prepare.has_last_classes); // without last classes as if all had been body
+        body = body && (relative >= prepare.keep_below || last != 0u);
         last_classes.at[i] = body ? 1u : 0u;
     }
-    if (!body) {
-        note(COUNT_SPLASH);
-        write(k, center, vec3(-1.0, 1.0, 1.0), vec3(0.0));
-        return;
-    }
-    note(COUNT_BODY);
-    if (s.number[b] <= prepare.options.x + 1u) {
-        note(COUNT_FEW_NEIGHBOURS);
-        write(k, center, vec3(1.0), vec3(0.0));
-        return;
-    }
+    return body;
+}
+
+void write_sphere(uint k, vec3 center, uint why) {
+    note(why);
+    // The sign says which class.
+    write(k, center, vec3(why == COUNT_SPLASH ? -1.0 : 1.0, 1.0, 1.0), vec3(0.0));
+}
+
+// YuTurk13's ellipsoid of particle k from its sums, those of component b; center in radii.
+void write_ellipsoid(uint k, vec3 center, Sums s, uint b) {
+    float unit = 1.0 / prepare.radius;
     vec3 mean = of(s.first, b) / s.weight[b], d = of(s.diagonal, b) / s.weight[b] - mean * mean;
     vec3 m = of(s.mixed_part, b) / s.weight[b] - mean.xxy * mean.yzz;
     mat3 a = unit * unit * mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z), v;
     eigen(a, v);
     vec3 variance = vec3(a[0][0], a[1][1], a[2][2]);
-    float most = max(variance.x, max(variance.y, variance.z)), least = most * prepare.shape.y;
-    if (most < DEGENERATE_SHARE * prepare.shape.w) {
-        note(COUNT_DEGENERATE);
-        write(k, center, vec3(1.0), vec3(0.0));
+    float most = max(variance.x, max(variance.y, variance.z)), least = most * prepare.least_ratio;
+    if (most < DEGENERATE_VARIANCE * prepare.filled_variance) {
+        write_sphere(k, center, COUNT_DEGENERATE);
         return;
     }
     if (min(variance.x, min(variance.y, variance.z)) < least) note(COUNT_CLAMPED_RATIO);
-    vec3 wanted = max(variance, vec3(least)) / prepare.shape.w;
-    if (most / prepare.shape.w > prepare.shape.z) note(COUNT_CLAMPED_LONG);
-    vec3 axes = min(wanted, vec3(prepare.shape.z)), l = axes * axes;
+    vec3 wanted = max(variance, vec3(least)) / prepare.filled_variance;
+    if (most / prepare.filled_variance > prepare.longest_axis) note(COUNT_CLAMPED_LONG);
+    vec3 axes = min(wanted, vec3(prepare.longest_axis)), l = axes * axes;
     // S = V diag(l) V^T
     vec3 r0 = vec3(v[0].x, v[1].x, v[2].x), r1 = vec3(v[0].y, v[1].y, v[2].y), r2 = vec3(v[0].z, v[1].z, v[2].z);
-    write(k, center + prepare.shape.x * unit * mean, vec3(dot(r0 * r0, l), dot(r1 * r1, l), dot(r2 * r2, l)),
+    write(k, center + prepare.smoothing * unit * mean, vec3(dot(r0 * r0, l), dot(r1 * r1, l), dot(r2 * r2, l)),
           vec3(dot(r0 * r1, l), dot(r0 * r2, l), dot(r1 * r2, l)));
+}
+
+// Class and ellipsoid of particle k at x from its sums, those of component b.
+void finish(uint k, vec3 x, Sums s, uint b) {
+    vec3 origin = uintBitsToFloat(uvec3(extent.at[EXTENT_ORIGIN], extent.at[EXTENT_ORIGIN + 1], extent.at[EXTENT_ORIGIN + 2]));
+    float unit = 1.0 / prepare.radius;
+    vec3 center = unit * (x - origin);
+    if (!classify(k, s.density[b] / prepare.filled_density)) {
+        write_sphere(k, center, COUNT_SPLASH);
+        return;
+    }
+    note(COUNT_BODY);
+    if (s.number[b] <= prepare.min_neighbours + 1u) write_sphere(k, center, COUNT_FEW_NEIGHBOURS);
+    else write_ellipsoid(k, center, s, b);
+}
+
+// Particles that are taken together: those ranked from `from` to before `next`.
+struct Batch {
+    uint from;
+    uint next;
+    Vectors x;  // their positions; a component without a particle repeats the first, and is not written
+    ivec3 cell; // of the first
+    int top;    // z of the last one's cell
+};
+
+// The particle at `from` and those that follow in the same cell or the next: their candidates are nearly the same. `to`: where
+// the invocation's own end.
+Batch batch_of(uint from, uint to, vec3 x) {
+    Batch b = Batch(from, from + 1u, Vectors(x.xxxx, x.yyyy, x.zzzz), cell_of(x), 0);
+    b.top = b.cell.z;
+    for (uint c = 1u; c < SHAPE_RUN; ++c) {
+        if (RELATION_TABLE || b.next == to) break;
+        x = sorted_position(b.next);
+        ivec3 own = cell_of(x);
+        if (!finite(x) || own.xy != b.cell.xy || own.z > b.cell.z + 1) break;
+        ++b.next;
+        b.top = own.z;
+        b.x.x[c] = x.x;
+        b.x.y[c] = x.y;
+        b.x.z[c] = x.z;
+    }
+    return b;
+}
+
+// The runs that hold all candidates of a batch; those of sorted cells are not empty.
+const uint LARGEST_RUNS = 25u;
+uvec2 runs[LARGEST_RUNS];
+uint find_runs(Batch b) {
+    if (RELATION_TABLE) {
+        runs[0] = run_of(b.cell, b.cell, 0u);
+        return 1u;
+    }
+    uint number = 0u, begin = 0u;
+    int around = int(prepare.cells_around);
+    for (int i = -around; i <= around; ++i) {
+        for (int j = -around; j <= around; ++j) {
+            uvec2 run = run_of(b.cell + ivec3(i, j, -around), ivec3(b.cell.xy + ivec2(i, j), b.top + around), begin);
+            begin = run.y;
+            if (run.y > run.x) runs[number++] = run;
+        }
+    }
+    return number;
+}
+
+// Offsets of candidate y from a batch's particles, their squares, and which are shorter than the reach.
+bvec4 neighbours_of(Batch b, vec3 y, out Vectors offset, out vec4 squared) {
+    float limit = prepare.reach * prepare.reach;
+    offset = Vectors(y.x - b.x.x, y.y - b.x.y, y.z - b.x.z);
+    squared = offset.x * offset.x + offset.y * offset.y + offset.z * offset.z;
+    bvec4 near = lessThan(squared, vec4(limit)), tie = lessThanEqual(abs(squared - limit), vec4(4e-6 * limit));
+    if (any(tie)) {
+        for (uint c = 0u; c < SHAPE_RUN; ++c) {
+            if (tie[c]) near[c] = nearer(of(b.x, c), y);
+        }
+    }
+    return near;
+}
+
+#ifdef NEIGHBOURS
+uint listed[SHAPE_RUN]; // how many neighbours each particle of the batch has
+void list(Batch b, bvec4 near, uint candidate) {
+    for (uint c = 0u; b.from + c < b.next; ++c) {
+        if (!near[c]) continue;
+        uint word = 2u + listed[c]++;
+        if (word < list_words()) neighbours.at[(b.from + c) * list_words() + word] = input_index(candidate);
+    }
+}
+#endif
+
+// The sums over a batch's neighbours, from the candidates in `number` runs.
+Sums sum_over(Batch b, uint number) {
+    Vectors none = Vectors(vec4(0.0), vec4(0.0), vec4(0.0));
+    Sums s = Sums(uvec4(0u), vec4(0.0), vec4(0.0), none, none, none);
+    // One loop over all runs: invocations whose runs differ in length stay together.
+    uint run = 0u, j = runs[0].x, end = runs[0].y, step = step_of(runs[0]);
+    while (true) {
+        if (j >= end) {
+            if (++run == number) break;
+            j = runs[run].x;
+            end = runs[run].y;
+            step = step_of(runs[run]);
+        }
+        uint candidate = RELATION_TABLE ? entry_at(j) / 27u : j;
+        Vectors offset;
+        vec4 squared;
+        bvec4 near = neighbours_of(b, sorted_position(candidate), offset, squared);
+#ifdef NEIGHBOURS
+        // All are listed; those that the sums leave out count nothing.
+        list(b, near, candidate);
+        add(s, near, (j - runs[run].x) % step == 0u ? min(step, end - j) : 0u, offset, squared);
+        ++j;
+#else
+        add(s, near, min(step, end - j), offset, squared);
+        j += step;
+#endif
+    }
+    return s;
 }
 
 void main() {
@@ -237,90 +350,25 @@ void main() {
     while (next < to) {
         uint from = next++;
         vec3 x = sorted_position(from);
+#ifdef NEIGHBOURS
+        for (uint c = 0u; c < SHAPE_RUN; ++c) listed[c] = 0u;
+#endif
         if (!finite(x)) {
             write(from, vec3(0.0), vec3(0.0), vec3(0.0));
 #ifdef NEIGHBOURS
-            list(from, 0u);
+            begin_list(from, 0u);
 #endif
             continue;
         }
-        // Those that follow in the same cell or the next: their candidates are nearly the same. Components without a particle
-        // of their own repeat the first and are not written.
-        Vectors p = Vectors(x.xxxx, x.yyyy, x.zzzz);
-        ivec3 cell = cell_of(x);
-        int top = cell.z;
-        for (uint b = 1u; b < SHAPE_RUN; ++b) {
-            if (RELATION || next == to) break;
-            x = sorted_position(next);
-            ivec3 own = cell_of(x);
-            if (!finite(x) || own.xy != cell.xy || own.z > cell.z + 1) break;
-            ++next;
-            top = own.z;
-            p.x[b] = x.x;
-            p.y[b] = x.y;
-            p.z[b] = x.z;
-        }
-        uvec2 runs[LARGEST_RUNS];
-        uint number = 0u;
-        if (RELATION) {
-            runs[number++] = run_of(cell, cell, 0u);
-        } else {
-            int around = int(prepare.options.w);
-            uint begin = 0u;
-            for (int i = -around; i <= around; ++i) {
-                for (int j = -around; j <= around; ++j) {
-                    uvec2 run = run_of(cell + ivec3(i, j, -around), ivec3(cell.xy + ivec2(i, j), top + around), begin);
-                    begin = run.y;
-                    if (run.y > run.x) runs[number++] = run;
-                }
-            }
-        }
-        Vectors none = Vectors(vec4(0.0), vec4(0.0), vec4(0.0));
-        Sums s = Sums(uvec4(0u), vec4(0.0), vec4(0.0), none, none, none);
-        // One loop over all runs: invocations whose runs differ in length stay together.
-        float limit = prepare.lengths.w * prepare.lengths.w;
-        uint run = 0u, j = runs[0].x, end = runs[0].y, step = step_of(runs[0]);
+        Batch b = batch_of(from, to, x);
+        next = b.next;
+        Sums s = sum_over(b, find_runs(b));
+        for (uint c = 0u; c < SHAPE_RUN; ++c) {
+            if (from + c == next) break;
 #ifdef NEIGHBOURS
-        uint listed[SHAPE_RUN];
-        for (uint b = 0u; b < SHAPE_RUN; ++b) listed[b] = 0u;
+            begin_list(from + c, listed[c]);
 #endif
-        while (true) {
-            if (j >= end) {
-                if (++run == number) break;
-                j = runs[run].x;
-                end = runs[run].y;
-                step = step_of(runs[run]);
-            }
-            uint other = RELATION ? order_at(j) / 27u : j;
-            vec3 y = sorted_position(other);
-            Vectors o = Vectors(y.x - p.x, y.y - p.y, y.z - p.z);
-            vec4 squared = o.x * o.x + o.y * o.y + o.z * o.z;
-            bvec4 near = lessThan(squared, vec4(limit)), tie = lessThanEqual(abs(squared - limit), vec4(4e-6 * limit));
-            if (any(tie)) {
-                for (uint b = 0u; b < SHAPE_RUN; ++b) {
-                    if (tie[b]) near[b] = nearer(of(p, b), y);
-                }
-            }
-#ifdef NEIGHBOURS
-            // All are listed; those that the sums leave out count nothing.
-            for (uint b = 0u; from + b < next; ++b) {
-                if (!near[b]) continue;
-                uint place = 2u + listed[b]++;
-                if (place < share()) neighbours.at[(from + b) * share() + place] = input_index(other);
-            }
-            add(s, near, (j - runs[run].x) % step == 0u ? min(step, end - j) : 0u, o, squared);
-            ++j;
-#else
-            add(s, near, min(step, end - j), o, squared);
-            j += step;
-#endif
-        }
-        for (uint b = 0u; b < SHAPE_RUN; ++b) {
-            if (from + b == next) break;
-#ifdef NEIGHBOURS
-            list(from + b, listed[b]);
-#endif
-            finish(from + b, of(p, b), s, b);
+            finish(from + c, of(b.x, c), s, c);
         }
     }
     for (uint c = 0u; c < COUNTERS - COUNT_SPLASH; ++c) {

@@ -17,12 +17,12 @@ layout(set = 0, binding = 5, std430) buffer SortedBlock { float at[]; } sorted;
 
 const uint ITEMS = BLOCK / PARTICLE_GROUP;
 
-// The entry at a place before this pass; the first pass finds the input's order.
-uint entry_at(uint place, uint pass) { return pass == 0u ? place : order.at[half_before(pass) + place]; }
+// The entry that is ranked so before this pass; the first pass finds the input's order.
+uint entry_at(uint rank, uint pass) { return pass == 0u ? rank : order.at[half_before(pass) + rank]; }
 
 uint digit_of(uint entry) {
     uvec3 key = sort_key(entry_cell(entry));
-    uint from = prepare.options.y * DIGIT_BITS, word = from >> 5, shift = from & 31u;
+    uint from = prepare.sort_pass * DIGIT_BITS, word = from >> 5, shift = from & 31u;
     uint bits = key[word] >> shift;
     if (shift > 32u - DIGIT_BITS && word < 2u) bits |= key[word + 1u] << (32u - shift);
     return bits & (DIGITS - 1u);
@@ -37,17 +37,17 @@ void main() {
     scan_row(gl_WorkGroupID.x, blocks(), DIGITS);
 #elif defined(GATHER)
     uint k = invocation();
-    if (k >= prepare.source.x) return;
+    if (k >= prepare.count) return;
     // The relation table is looked up from particles in the order of the input.
-    uint i = RELATION ? k : entry_at(k, extent.at[EXTENT_PASSES]);
+    uint i = RELATION_TABLE ? k : entry_at(k, extent.at[EXTENT_PASSES]);
     vec3 x = position(i);
     sorted.at[3u * k] = x.x;
     sorted.at[3u * k + 1u] = x.y;
     sorted.at[3u * k + 2u] = x.z;
     // Where keys are one word they are kept, in the half of the order that is free now: look-ups are faster for it.
-    if (!RELATION && key_bits() <= 32u) order.at[free_half() + k] = sort_key(cell_of(x)).x;
+    if (!RELATION_TABLE && key_bits() <= 32u) order.at[free_half() + k] = sort_key(cell_of(x)).x;
 #else
-    uint block = group_index(), t = gl_LocalInvocationIndex, pass = prepare.options.y;
+    uint block = group_index(), t = gl_LocalInvocationIndex, pass = prepare.sort_pass;
     if (block >= blocks()) return;
     for (uint d = 0u; d < DIGITS; ++d) counts[d * PARTICLE_GROUP + t] = 0u;
     uint from = min(block * BLOCK + t * ITEMS, entries()), to = min(from + ITEMS, entries());

@@ -17,8 +17,8 @@ void main() {
     vec3 q;
     float a, b, discriminant = quadratic(Cast(center, g_diagonal, g_mixed), v, q, a, b);
     if (discriminant < 0.0) discard;
-    float root = sqrt(discriminant), near = frame.viewport.z;
-    bool back = splat.what.y == SIDE_BACK;
+    float root = sqrt(discriminant), near = frame.near;
+    bool back = splat.side == SIDE_BACK;
     float far_depth = center.z + (root - b) / a;
     if (far_depth < near) discard;
     float s = back ? (root - b) / a : (-root - b) / a;

@@ -21,17 +21,17 @@ void main() {
     gl_PointSize = 1.0;
 #endif
     // The list of this class and side (compact).
-    uint count = frame.particles.x;
+    uint count = frame.count;
     Particle p;
     int cls;
-    particle(drawn.at[splat.what.y * count + (splat.what.x == CLASS_SPLASH ? rank : count - 1u - rank)], p, cls);
+    particle(drawn.at[splat.side * count + (splat.cls == CLASS_SPLASH ? rank : count - 1u - rank)], p, cls);
     Ellipsoid e = to_eye(p);
     vec4 box = pixel_bounds(e);
 
     center = vec3(e.center.xy, -e.center.z);
     inverse_shape(e, g_diagonal, g_mixed);
 
-    vec2 scale = 2.0 / frame.viewport.xy;
+    vec2 scale = 2.0 / frame.size;
 #ifdef QUADS
     // Half a pixel more each way, as the points have: vertices may snap to sixteenths of a pixel.
     vec2 corner = vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1);

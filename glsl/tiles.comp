@@ -9,7 +9,7 @@
 layout(local_size_x = FRONT_TILE, local_size_y = FRONT_TILE) in;
 layout(set = 0, binding = 1) uniform texture2DArray body_depth;
 layout(set = 0, binding = 2) uniform texture2DArray splash_depth;
-layout(set = 0, binding = 3, r32f) uniform writeonly image2DArray range_out;
+layout(set = 0, binding = 3, r32f) uniform writeonly image2DArray front_tiles;
 layout(constant_id = 0) const bool HAS_SPLASH = true;
 layout(constant_id = 1) const bool HAS_BODY = true;
 shared uint low;
@@ -29,13 +29,13 @@ void main() {
     }
     barrier();
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (all(lessThan(pixel, ivec2(frame.viewport.xy)))) {
+    if (all(lessThan(pixel, ivec2(frame.size)))) {
         if (HAS_BODY) add(texelFetch(body_depth, ivec3(pixel, SIDE_FRONT), 0).x);
         if (HAS_SPLASH) add(texelFetch(splash_depth, ivec3(pixel, SIDE_FRONT), 0).x);
     }
     barrier();
     if (gl_LocalInvocationIndex == 0u) {
-        imageStore(range_out, ivec3(gl_WorkGroupID.xy, 0), vec4(uintBitsToFloat(low)));
-        imageStore(range_out, ivec3(gl_WorkGroupID.xy, 1), vec4(uintBitsToFloat(high)));
+        imageStore(front_tiles, ivec3(gl_WorkGroupID.xy, 0), vec4(uintBitsToFloat(low)));
+        imageStore(front_tiles, ivec3(gl_WorkGroupID.xy, 1), vec4(uintBitsToFloat(high)));
     }
 }

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex};
 /// What the host lends. Handles are cloned function tables: the host keeps the device alive until the
 /// [`crate::Renderer`] is gone, and destroys it itself.
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Host {
     /// Instance, Vulkan 1.3.
     pub instance: ash::Instance,
@@ -29,6 +30,29 @@ pub struct Host {
     pub pipeline_cache: vk::PipelineCache,
     /// `VK_EXT_debug_utils`, if the instance has it: names resources and labels passes.
     pub debug_utils: Option<ash::ext::debug_utils::Device>,
+}
+
+impl Host {
+    /// What every host has to lend: see the fields. One frame in flight, no large points, no cache, no names.
+    pub fn new(
+        instance: ash::Instance,
+        device: ash::Device,
+        physical_device: vk::PhysicalDevice,
+        queue_family: u32,
+        allocator: Arc<Mutex<Allocator>>,
+    ) -> Host {
+        Host {
+            instance,
+            device,
+            physical_device,
+            queue_family,
+            allocator,
+            frames_in_flight: 1,
+            large_points: false,
+            pipeline_cache: vk::PipelineCache::null(),
+            debug_utils: None,
+        }
+    }
 }
 
 /// Formats of the renderer's own targets, with what each must support.

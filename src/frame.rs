@@ -6,6 +6,7 @@ use crate::{
     device::Limits,
     input::{Background, EnvironmentShape},
     layers::Surfaces,
+    method::Offers,
     passes::{Arrays, compact, counters, cull, extent, occlude, shape, sort},
     plan::{Home, Plan},
     shader, smooth,
@@ -41,9 +42,10 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
         let drawn = compact::record(&mut plan, scene, &particles, visible);
         // The liquid's surfaces (Imai16 §4.2), the body's smoothed (Imai16 §4.3).
         plan.work_for(Home::View, "layers");
-        surfaces = method.layers.member().record(&mut plan, scene, &drawn);
+        let layered = method.layers.member().record(&mut plan, scene, &drawn);
         plan.work_for(Home::View, "smooth");
-        surfaces.body = surfaces.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
+        surfaces.body = layered.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
+        (surfaces.splash, surfaces.thickness) = (layered.splash, layered.thickness);
     }
     #[cfg(feature = "inspect")]
     {
@@ -114,16 +116,22 @@ impl<'a> Scene<'a> {
         }
     }
 
+    /// What the optics ask of the layers.
+    pub fn asks(&self) -> Offers {
+        self.settings.method.optics.member().asks()
+    }
+
     /// Sides of each class that are drawn: front only, or front and back.
     pub fn sides(&self) -> u32 {
-        if self.settings.method.optics.member().asks().backs { 2 } else { 1 }
+        if self.asks().backs { 2 } else { 1 }
     }
 
     /// Whether hidden particles are dropped before drawing. That only saves time: where its bounds do not fit a storage
     /// buffer, everything is drawn.
     pub fn occlusion(&self) -> bool {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
-        self.body && self.settings.drawing.occlusion_culling && 8 * pixels <= self.storage_size
+        let wanted = self.settings.drawing.occlusion_culling && self.settings.method.layers.member().may_cull(self);
+        self.body && wanted && 8 * pixels <= self.storage_size
     }
 
     /// Whether the last shader encodes sRGB.

@@ -22,6 +22,7 @@ pub enum Background {
 
 /// An environment of the host's own, in place of [`crate::Renderer::set_environment`]'s.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct EnvironmentInput {
     /// Linear light, infinitely far away, sampled in the fragment stage; mip level 0 is used. Of any format that reads as
     /// floats (float, UNORM or sRGB).
@@ -46,6 +47,7 @@ pub enum EnvironmentShape {
 /// through it, and ends rays under water. Liquid whose wall lies up to three and a half radii (across that wall) before an
 /// opaque surface touches it: simulated particles stop short of floors.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct SceneInput {
     /// Linear colour, sampled in the fragment stage.
     pub color: vk::ImageView,
@@ -58,6 +60,24 @@ pub struct SceneInput {
     /// Depth value where nothing was drawn, 0 to 1: 1 with depths that grow away from the eye ([`Camera::look_at`]), 0 with
     /// reversed ones. Compared for equality: what is infinitely far away is seen there (see [`Background`]).
     pub cleared_depth: f32,
+}
+
+impl EnvironmentInput {
+    /// A map and the layout it is in.
+    pub fn new(view: vk::ImageView, layout: vk::ImageLayout, shape: EnvironmentShape) -> EnvironmentInput {
+        EnvironmentInput { view, layout, shape }
+    }
+}
+
+impl SceneInput {
+    /// Colour and depth, each with the layout it is in, and the depth where nothing was drawn.
+    pub fn new(
+        (color, color_layout): (vk::ImageView, vk::ImageLayout),
+        (depth, depth_layout): (vk::ImageView, vk::ImageLayout),
+        cleared_depth: f32,
+    ) -> SceneInput {
+        SceneInput { color, color_layout, depth, depth_layout, cleared_depth }
+    }
 }
 
 /// One frame.
@@ -153,5 +173,41 @@ impl<'a> FrameInput<'a> {
             eye_inside: false,
             output,
         }
+    }
+
+    /// The same of positions on the device, or of the particles last given.
+    #[must_use]
+    pub fn positions(self, positions: impl Into<Option<DevicePositions>>) -> Self {
+        FrameInput { positions: positions.into(), ..self }
+    }
+
+    /// The same before a scene of the host's, or without one.
+    #[must_use]
+    pub fn scene(self, scene: impl Into<Option<SceneInput>>) -> Self {
+        FrameInput { scene: scene.into(), ..self }
+    }
+
+    /// The same before another background.
+    #[must_use]
+    pub fn background(self, background: Background) -> Self {
+        FrameInput { background, ..self }
+    }
+
+    /// The same in an environment of the host's own, or in the renderer's.
+    #[must_use]
+    pub fn environment(self, environment: impl Into<Option<EnvironmentInput>>) -> Self {
+        FrameInput { environment: environment.into(), ..self }
+    }
+
+    /// The same with the eye inside the body, or outside.
+    #[must_use]
+    pub fn eye_inside(self, inside: bool) -> Self {
+        FrameInput { eye_inside: inside, ..self }
+    }
+
+    /// The same into another output.
+    #[must_use]
+    pub fn output(self, output: vk::ImageView) -> Self {
+        FrameInput { output, ..self }
     }
 }

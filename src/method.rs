@@ -28,13 +28,16 @@ pub(crate) struct Offers {
     pub backs: bool,
     /// Normals of the particles' own surfaces.
     pub normals: bool,
+    /// How much liquid there is along each view ray, all particles' shares added.
+    pub thickness: bool,
 }
 
 impl Offers {
-    const WORDS: [&'static str; 2] = ["the far side of the liquid", "the particles' own normals"];
+    const WORDS: [&'static str; 3] =
+        ["the far side of the liquid", "the particles' own normals", "the liquid's thickness"];
 
-    fn all(self) -> [bool; 2] {
-        [self.backs, self.normals]
+    fn all(self) -> [bool; 3] {
+        [self.backs, self.normals, self.thickness]
     }
 }
 
@@ -55,7 +58,7 @@ impl Method {
                 let having = |l: &Layers| l.member().offers().all()[i];
                 let others: Vec<_> = Layers::all().iter().filter(|l| having(l)).map(Layers::name).collect();
                 let remedy = format!(
-                    "it needs {}, which layers {} do not have: use layers {}",
+                    "it needs {}, which the layers {} do not have: use {}",
                     Offers::WORDS[i],
                     self.layers.name(),
                     others.join(" or ")

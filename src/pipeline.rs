@@ -16,9 +16,14 @@ type Made = Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>;
 impl Blend {
     fn state(self) -> vk::PipelineColorBlendAttachmentState {
         let state = vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
-        match self {
-            Blend::Replace => state,
-        }
+        let op = match self {
+            Blend::Replace => return state,
+            Blend::Add => vk::BlendOp::ADD,
+            Blend::Largest => vk::BlendOp::MAX,
+        };
+        let (one, state) = (vk::BlendFactor::ONE, state.blend_enable(true).color_blend_op(op).alpha_blend_op(op));
+        let state = state.src_color_blend_factor(one).dst_color_blend_factor(one);
+        state.src_alpha_blend_factor(one).dst_alpha_blend_factor(one)
     }
 }
 

@@ -241,12 +241,14 @@ impl Recorder<'_> {
                 .store_op(vk::AttachmentStoreOp::STORE)
                 .clear_value(value)
         };
-        let zero = vk::ClearValue { color: vk::ClearColorValue { uint32: [0; 4] } };
         let mut colors = Vec::with_capacity(rendering.colors.len());
         for color in &rendering.colors {
-            let load = if color.keep { vk::AttachmentLoadOp::LOAD } else { vk::AttachmentLoadOp::CLEAR };
+            let load = if color.clear.is_some() { vk::AttachmentLoadOp::CLEAR } else { vk::AttachmentLoadOp::LOAD };
             let view = self.layer(color.target, color.layer)?;
-            colors.push(attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, load, zero));
+            // Zero is zero in integer formats too; only floats start as anything else.
+            let float32 = color.clear.unwrap_or_default();
+            let clear = vk::ClearValue { color: vk::ClearColorValue { float32 } };
+            colors.push(attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, load, clear));
         }
         let [width, height] = rendering.colors.first().map_or(self.plan.size, |c| self.plan.attachment_size(c.target));
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };

@@ -19,7 +19,7 @@ use crate::{
     table::{self, LedgerEntry, Table},
 };
 use ash::vk;
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use std::collections::HashSet;
 use uploads::PARTICLE_ARRAYS;
 
@@ -319,7 +319,7 @@ impl Renderer {
             // The buffer that the last frame left is still the one, if it is as large as this frame's.
             let old = self.tables[0].get(LAST_CLASSES).map(|e| e.spec);
             let same = matches!(old, Some(Spec::Buffer { bytes, .. }) if bytes == 4 * u64::from(scene.count));
-            p.constants.options.z = u32::from(keeps_classes && same && self.last_classes);
+            p.constants.has_last_classes = u32::from(keeps_classes && same && self.last_classes);
         }
         let plan = frame::plan(&scene)?;
         if let Some(p) = &input.positions {
@@ -343,13 +343,15 @@ impl Renderer {
             self.surfaces = plan.surfaces;
         }
 
-        block.particles.x = scene.count;
-        block.particles.z = self.limits.point_size as u32;
-        block.particles.w = u32::from(input.settings.drawing.quads_only || !scene.points);
-        block.scene.w = f32::from(input.eye_inside);
+        block.count = scene.count;
+        block.largest_point = self.limits.point_size as u32;
+        block.quads_only = u32::from(input.settings.drawing.quads_only || !scene.points);
+        block.eye_inside = f32::from(input.eye_inside);
         if let Some(scene) = &input.scene {
             let p = &input.camera.projection;
-            block.scene = Vec4::new(p.z_axis.z, p.w_axis.z / space.radius as f32, scene.cleared_depth, block.scene.w);
+            block.scene_z_scale = p.z_axis.z;
+            block.scene_z_offset = p.w_axis.z / space.radius as f32;
+            block.scene_cleared = scene.cleared_depth;
         }
         let particles = self.particles.as_ref();
         let externals = Externals {

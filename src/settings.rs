@@ -6,7 +6,8 @@ use crate::{
     shader::Frame,
     space::Space,
 };
-use glam::{Mat3, Mat4, UVec4, Vec3, Vec4};
+use bytemuck::Zeroable;
+use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
 
 parameters! {
     /// The liquid itself.
@@ -161,27 +162,11 @@ impl Camera {
     /// The uniform block of a frame, as shaders and twins read it: lengths in particle radii, positions in the liquid's
     /// own [`Space`]. `size` in pixels, `bounds` (the box around the liquid) in world units. Host scene and particle counts
     /// are left zero.
-    pub fn uniforms(&self, settings: &Settings, size: [u32; 2], space: &Space, bounds: (Vec3, Vec3)) -> Frame {
+    pub(crate) fn uniforms(&self, settings: &Settings, size: [u32; 2], space: &Space, bounds: (Vec3, Vec3)) -> Frame {
         let radius = space.radius as f32;
-        let (view, low, high) = (space.view(self.view), space.local(bounds.0), space.local(bounds.1));
+        let view = space.view(self.view);
         let (w, h) = (size[0] as f32, size[1] as f32);
         let p = &self.projection;
-        // pixel = (ndc + 1) / 2 * size and ndc = P v - P02 for v = (x/d, y/d, -1)
-        let to_pixel = Vec4::new(
-            p.x_axis.x * 0.5 * w,
-            p.y_axis.y * 0.5 * h,
-            (1.0 - p.z_axis.x) * 0.5 * w,
-            (1.0 - p.z_axis.y) * 0.5 * h,
-        );
-        let middle = view.transform_point3(0.5 * (low + high)).length();
-        let farthest = middle + 0.5 * (high - low).length();
-        // A thousandth of a radius finds a root; a float's steps at the farthest depth are the floor below it.
-        let converged = 1e-3f32.max(1e-6 * farthest);
-        // What a pixel covers at the liquid: where particles are hardly larger, their own size says nothing of what a
-        // map can tell apart.
-        let pixel = middle / to_pixel.x.abs().max(to_pixel.y.abs());
-        let accepted = Self::ACCEPTED.max(Self::ACCEPTED_PIXELS * pixel).max(converged);
-        let jump = Self::JUMP.max(Self::JUMP_PIXELS * pixel);
         let to_up = Mat3::from_quat(glam::Quat::from_rotation_arc(self.up.as_dvec3().normalize().as_vec3(), Vec3::Y));
         // Where the map is turned one way, directions are looked up turned the other. Whole turns in double precision.
         let turn = f64::from(self.environment_rotation) % std::f64::consts::TAU;
@@ -189,33 +174,16 @@ impl Camera {
         Frame {
             view,
             eye_to_env: Mat4::from_mat3(to_env * Mat3::from_mat4(self.view).transpose()),
-            to_pixel,
-            viewport: Vec4::new(w, h, self.near / radius, 0.0),
-            smoothing: smoothing(settings),
-            search: Vec4::new(converged, accepted, jump, settings.liquid.ior),
-            absorption: (settings.liquid.absorption * radius).min(Vec3::MAX).extend(0.0), // infinite times nothing is no number
-            bounds_min: low.extend(0.0),
-            bounds_max: high.extend(0.0),
-            scene: Vec4::ZERO,
-            particles: UVec4::ZERO,
+            // pixel = (ndc + 1) / 2 * size and ndc = P v - P02 for v = (x/d, y/d, -1)
+            pixel_scale: Vec2::new(p.x_axis.x * 0.5 * w, p.y_axis.y * 0.5 * h),
+            pixel_origin: Vec2::new((1.0 - p.z_axis.x) * 0.5 * w, (1.0 - p.z_axis.y) * 0.5 * h),
+            size: Vec2::new(w, h),
+            near: self.near / radius,
+            ior: settings.liquid.ior,
+            absorption: (settings.liquid.absorption * radius).min(Vec3::MAX), // infinite times nothing is no number
+            bounds_min: space.local(bounds.0),
+            bounds_max: space.local(bounds.1),
+            ..Frame::zeroed()
         }
     }
-
-    /// Largest |f| of an accepted hit, in particle radii, or
-    pub const ACCEPTED: f32 = crate::shader::ACCEPTED;
-    /// in what a pixel covers in the middle of the liquid, whichever is more.
-    pub const ACCEPTED_PIXELS: f32 = crate::shader::ACCEPTED_PIXELS;
-    /// Largest spread of the depths around a sample that is still interpolated, in particle radii, or
-    pub const JUMP: f32 = crate::shader::JUMP;
-    /// in what a pixel covers in the middle of the liquid, whichever is more: a surface 80 degrees steep.
-    pub const JUMP_PIXELS: f32 = crate::shader::STEEP;
-}
-
-/// What plane fitting reads of the block.
-fn smoothing(settings: &Settings) -> Vec4 {
-    let sigma = match &settings.method.smooth {
-        crate::smooth::Smooth::PlaneFit(p) => p.sigma,
-        _ => 1.0,
-    };
-    Vec4::new(sigma, crate::shader::FIT_UPDATE_LIMIT * sigma, crate::shader::FIT_GRAZING_LIMIT, 0.0)
 }

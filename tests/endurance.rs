@@ -3,9 +3,12 @@
 
 use glam::Vec3;
 use meniscus::{
-    Background, Camera, Equirect, FrameInput, SceneInput, Settings,
+    Background, Camera, Equirect, FrameInput, Method, SceneInput, Settings,
     host::{Canvas, Gpu, Instance, Session, Upload},
+    inspect::Inspection,
+    optics::Optics,
     prepare::{self, DevicePositions},
+    smooth::plane_fit::PlaneFit,
 };
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -115,18 +118,27 @@ struct Endured {
     pass: String,
 }
 
+fn settings(kind: &Kind) -> Settings {
+    let optics = ["one", "two", "", "four"][kind.refractions as usize - 1];
+    let mut method = Method::default();
+    method.optics = Optics::named(optics).expect("one of three");
+    method.smooth = PlaneFit::default().iterations(kind.iterations).into();
+    method.into()
+}
+
 fn run(gpu: &Gpu, kind: &Kind) -> Endured {
     const SIZE: [u32; 2] = [16, 12];
     let radius = 0.05;
     let positions = liquid(radius);
     let grey = Equirect::new(2, 1, &[[0.5; 3]; 2]).expect("a map");
     let mut session = Session::new(gpu, SIZE, &grey).expect("session");
-    let settings = Settings { refractions: kind.refractions, iterations: kind.iterations, ..Settings::default() };
+    let settings = settings(kind);
+    session.renderer.inspect(Inspection { walks: kind.debug, neighbours: 0 });
     let input = prepare::Input { positions: &positions, radius, classes: None, ellipsoids: None };
     session.renderer.set_particles(&prepare::prepare(&input, &Default::default()).expect("prepared").0).expect("given");
     let upload = Upload::new(gpu, bytemuck::cast_slice(&positions)).expect("upload");
     let packed = DevicePositions::packed(upload.buffer, positions.len() as u32, radius);
-    let device_positions = DevicePositions { keep_class_below: Some(0.6), ..packed };
+    let device_positions = packed.keep_class_below(0.6);
     let layout = ash::vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
     let image = |format, texel: usize| {
         let canvas = Canvas::new(gpu, format, texel as u64, SIZE).expect("canvas");
@@ -136,13 +148,7 @@ fn run(gpu: &Gpu, kind: &Kind) -> Endured {
     };
     let color = image(ash::vk::Format::R32G32B32A32_SFLOAT, 16);
     let depth = image(ash::vk::Format::R32_SFLOAT, 4);
-    let scene = SceneInput {
-        color: color.view,
-        color_layout: layout,
-        depth: depth.view,
-        depth_layout: layout,
-        cleared_depth: 1.0,
-    };
+    let scene = SceneInput::new((color.view, layout), (depth.view, layout), 1.0);
     let (mut before, mut held) = (0.0, 0);
     let mut times = Vec::with_capacity(WATCHED);
     for frame in 0..WARM + WATCHED {
@@ -153,14 +159,13 @@ fn run(gpu: &Gpu, kind: &Kind) -> Endured {
         let eye = Vec3::new((0.01 * frame as f32).sin(), 0.2, 2.0);
         let camera = Camera::look_at(eye, Vec3::ZERO, Vec3::Y, 0.7, 4.0 / 3.0, 0.01);
         let frame_times = session
-            .frame(&FrameInput {
-                positions: kind.on_device.then_some(device_positions),
-                scene: kind.scene.then_some(scene),
-                background: if kind.scene { Background::Host } else { Background::Environment },
-                eye_inside: kind.inside,
-                debug: kind.debug,
-                ..FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null())
-            })
+            .frame(
+                &FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null())
+                    .positions(kind.on_device.then_some(device_positions))
+                    .scene(kind.scene.then_some(scene))
+                    .background(if kind.scene { Background::Host } else { Background::Environment })
+                    .eye_inside(kind.inside),
+            )
             .expect("frame");
         if frame >= WARM {
             // Only the slowest pass, by its place: nothing that would count as held.

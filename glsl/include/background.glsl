@@ -49,33 +49,33 @@ const float CLEARED = 1e30; // linear depth where the host drew nothing
 
 float scene_linear(ivec2 p) {
     float z = texelFetch(scene_depth, p, 0).x;
-    return z == frame.scene.z ? CLEARED : frame.scene.y / (z + frame.scene.x);
+    return z == frame.scene_cleared ? CLEARED : frame.scene_z_offset / (z + frame.scene_z_scale);
 }
 
 bool scene_hides(ivec2 pixel, float depth) { return scene_linear(pixel) < depth; }
 
-// Where a ray first meets the scene, pixel by pixel: within a pixel it passes that pixel's depth, or it enters a pixel a
-// little behind its depth and was in front of the scene before, so that the surface lies between two pixels. Further
-// behind, it passes behind an object.
+// Where a ray first meets the scene, pixel by pixel: it reaches the pixel's depth within the pixel, or it comes into the pixel
+// a little behind that depth and was in front of the scene until there, so that the surface lies between two pixels. Where it
+// comes in further behind, it passes behind an object.
 bool meets_scene(Ray ray, out float t, out ivec2 pixel) {
-    vec2 p0 = project(ray.origin), way = project(ray.origin + ray.reach * ray.dir) - p0;
-    float k0 = -1.0 / ray.origin.z, k1 = 1.0 / (-ray.origin.z - ray.reach * ray.dir.z);
-    float nudge = PIXEL_NUDGE / max(ray.span, 1e-6), at = 0.0;
-    bool before = true;
-    int most = int(frame.viewport.x + frame.viewport.y) + 4; // no line crosses more pixels
-    for (int i = 0; i < most && at < 1.0; ++i) {
-        pixel = nearest(p0 + min(at + nudge, 1.0) * way);
-        float end = leaves_cell(p0, way, pixel, 1, at + nudge);
-        float d_at = 1.0 / mix(k0, k1, at), d_end = 1.0 / mix(k0, k1, end), surface = scene_linear(pixel);
-        float behind = d_at - surface;
-        bool between = before && behind > 0.0 && behind <= surface * max(SCENE_BEHIND, STEEP / abs(frame.to_pixel.x));
-        // At infinity rounding may leave nothing of 1 / d.
+    ScreenLine line = screen_line(ray);
+    float nudge = PIXEL_NUDGE / max(ray.span, 1e-6), s = 0.0;
+    bool in_front = true;
+    int most = int(frame.size.x + frame.size.y) + 4; // no line crosses more pixels
+    for (int i = 0; i < most && s < 1.0; ++i) {
+        pixel = pixel_after(line, s, nudge);
+        float end = leaves_square(line, pixel, 1, s + nudge);
+        float d = depth_at(line, s), d_end = depth_at(line, end), surface = scene_linear(pixel);
+        float behind = d - surface;
+        bool between = in_front && behind > 0.0 && behind <= surface * max(SCENE_BEHIND, STEEP / abs(frame.pixel_scale.x));
         if (between || (behind <= 0.0 && surface <= d_end && surface < CLEARED)) {
-            t = pixel_to_t(ray, between || k1 == k0 ? at : clamp((1.0 / surface - k0) / (k1 - k0), at, end));
+            float k0 = line.inverse_start, k1 = line.inverse_end;
+            // At infinity rounding may leave nothing of 1 / d.
+            t = t_at(ray, between || k1 == k0 ? s : clamp((1.0 / surface - k0) / (k1 - k0), s, end));
             return true;
         }
-        before = d_end <= surface;
-        at = end;
+        in_front = d_end <= surface;
+        s = end;
     }
     t = ray.reach;
     return false;
@@ -88,7 +88,7 @@ vec3 infinitely_far(vec3 dir) {
     if (HOST_BACKGROUND && dir.z < 0.0) {
         // The host's own sky, where it is in the view.
         vec2 p = project(dir);
-        if (all(greaterThanEqual(p, vec2(0.0))) && all(lessThan(p, frame.viewport.xy)) && scene_linear(ivec2(p)) == CLEARED)
+        if (all(greaterThanEqual(p, vec2(0.0))) && all(lessThan(p, frame.size)) && scene_linear(ivec2(p)) == CLEARED)
             return scene_light(ivec2(p));
     }
     return env_color(dir);

@@ -1,13 +1,13 @@
 // What happens to light at one water surface.
 
-// Share of light reflected. `air` and `water` are the cosines on either side of the interface.
+// Reflectance. `air` and `water` are the cosines on either side of the interface.
 float fresnel(float air, float water, float ior, bool exact) {
     if (exact) {
         float s = (air - ior * water) / (air + ior * water);
         float p = (ior * air - water) / (ior * air + water);
         return 0.5 * (s * s + p * p);
     }
-    // Schlick, with the cosine in air on either way: leaving water that is the transmitted angle.
+    // Schlick, always with the cosine in air: leaving water that is the cosine of the transmitted angle.
     float r0 = (ior - 1.0) / (ior + 1.0);
     float x = 1.0 - air;
     return r0 * r0 + (1.0 - r0 * r0) * x * x * x * x * x;

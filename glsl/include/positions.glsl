@@ -2,14 +2,14 @@
 layout(set = 0, binding = 1, std430) readonly buffer PositionBlock { float at[]; } positions;
 layout(set = 0, binding = 2, std430) buffer ExtentBlock { uint at[]; } extent;
 layout(push_constant) uniform PushBlock { Prepare prepare; };
-// A constant and not a branch on prepare.source.w: see refract.frag on branches that only uniforms decide.
-layout(constant_id = 0) const bool RELATION = false; // the sort orders entries of the relation table, not particles
+// A constant and not a branch on prepare.entries_per_particle: see refract.frag on branches that only uniforms decide.
+layout(constant_id = 0) const bool RELATION_TABLE = false; // the sort orders entries of the relation table, not particles
 
 const int FURTHEST_CELL = 1 << 29;
 
 vec3 position(uint i) {
-    uint at = prepare.source.y + i * prepare.source.z;
-    return prepare.classes.w * vec3(positions.at[at], positions.at[at + 1u], positions.at[at + 2u]);
+    uint at = prepare.first_word + i * prepare.word_stride;
+    return prepare.unit_scale * vec3(positions.at[at], positions.at[at + 1u], positions.at[at + 2u]);
 }
 
 bool finite(vec3 x) { return !any(isnan(x)) && !any(isinf(x)); }
@@ -48,11 +48,11 @@ ivec3 last_cell() { return ivec3(extent.at[EXTENT_LAST_CELL], extent.at[EXTENT_L
 // A position's cell; one that is not finite counts as in the last cell, where the sort keeps it out of the way.
 ivec3 cell_of(vec3 x) {
     if (!finite(x)) return last_cell();
-    return ivec3(cell_of(x.x, prepare.lengths.x), cell_of(x.y, prepare.lengths.x), cell_of(x.z, prepare.lengths.x));
+    return ivec3(cell_of(x.x, prepare.cell_edge), cell_of(x.y, prepare.cell_edge), cell_of(x.z, prepare.cell_edge));
 }
 
 // What the sort orders: particles, or entries of the relation table.
-uint entries() { return prepare.source.x * (RELATION ? 27u : 1u); }
+uint entries() { return prepare.count * (RELATION_TABLE ? 27u : 1u); }
 uint blocks() { return (entries() + BLOCK - 1u) / BLOCK; }
 
 // Where in the order's two halves entries lie before a pass of the sort; before the one after the last lies its result.
@@ -66,7 +66,7 @@ ivec3 entry_offset(uint entry) {
 
 // The cell of sort entry e: a particle, or (relation table) a particle in one of 27 cells.
 ivec3 entry_cell(uint e) {
-    if (RELATION) return cell_of(position(e / 27u)) + entry_offset(e);
+    if (RELATION_TABLE) return cell_of(position(e / 27u)) + entry_offset(e);
     return cell_of(position(e));
 }
 

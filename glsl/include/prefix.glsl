@@ -18,9 +18,9 @@ uint group_prefix(uint value, out uint total) {
 }
 
 void scan_row(uint row, uint length, uint rows) {
-    uint share = (length + PARTICLE_GROUP - 1u) / PARTICLE_GROUP;
-    uint from = row * length + min(gl_LocalInvocationIndex * share, length);
-    uint to = row * length + min((gl_LocalInvocationIndex + 1u) * share, length);
+    uint chunk = (length + PARTICLE_GROUP - 1u) / PARTICLE_GROUP; // counts a thread
+    uint from = row * length + min(gl_LocalInvocationIndex * chunk, length);
+    uint to = row * length + min((gl_LocalInvocationIndex + 1u) * chunk, length);
     uint sum = 0u, total;
     for (uint i = from; i < to; ++i) sum += sums.at[i];
     sum = group_prefix(sum, total);

@@ -32,7 +32,7 @@ vec2 tangent_interval(float c, float dc, float sxx, float sxz, float szz) {
 
 // Interval of x/d where the ellipsoid crosses the near plane: from its bounding box beyond that plane.
 vec2 crossing_interval(float c, float half_width, float far) {
-    float near = frame.viewport.z;
+    float near = frame.near;
     float lo = c - half_width, hi = c + half_width;
     return vec2(lo / (lo < 0.0 ? near : far), hi / (hi > 0.0 ? near : far));
 }
@@ -40,7 +40,7 @@ vec2 crossing_interval(float c, float half_width, float far) {
 // Pixel rectangle (lo.xy, hi.xy) that holds every pixel centre the ellipsoid covers, clipped to the viewport;
 // empty (lo >= hi) if there is none.
 vec4 pixel_bounds(Ellipsoid e) {
-    float dc = -e.center.z, reach = sqrt(e.sd.z), near = frame.viewport.z;
+    float dc = -e.center.z, reach = sqrt(e.sd.z), near = frame.near;
     if (dc + reach <= near) return vec4(1.0, 1.0, 0.0, 0.0);
     vec2 x, y;
     if (dc - reach > near) {
@@ -50,11 +50,11 @@ vec4 pixel_bounds(Ellipsoid e) {
         x = crossing_interval(e.center.x, sqrt(e.sd.x), dc + reach);
         y = crossing_interval(e.center.y, sqrt(e.sd.y), dc + reach);
     }
-    vec2 a = frame.to_pixel.xy * vec2(x.x, y.x) + frame.to_pixel.zw;
-    vec2 b = frame.to_pixel.xy * vec2(x.y, y.y) + frame.to_pixel.zw;
+    vec2 a = frame.pixel_scale * vec2(x.x, y.x) + frame.pixel_origin;
+    vec2 b = frame.pixel_scale * vec2(x.y, y.y) + frame.pixel_origin;
     // A hundredth of a pixel covers the rounding of a and b at 16384 pixels.
     vec2 lo = max(min(a, b) - 0.01, vec2(0.0));
-    vec2 hi = min(max(a, b) + 0.01, frame.viewport.xy);
+    vec2 hi = min(max(a, b) + 0.01, frame.size);
     return vec4(lo, hi);
 }
 

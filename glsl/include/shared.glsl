@@ -1,9 +1,10 @@
 // What the host and the shaders share. build.rs reads this file and makes Rust of it: each `struct` becomes a
-// #[repr(C)] struct, each `#define NAME number` a constant. Members are mat4, vec4 and uvec4 only, so that std140,
-// std430 and Rust lay them out alike; build.rs refuses anything else.
+// #[repr(C)] struct, each `#define NAME number` a constant. Members are float, uint, vec2, vec3, vec4, uvec4 and mat4, each
+// where the one before it ends, so that std140, std430 and Rust lay them out alike; build.rs refuses what would leave a gap.
 
-// Compute group edge for image passes without shared memory, and group size for particle passes.
+// Edge of a compute group of pixels, for passes without shared memory.
 #define IMAGE_GROUP 8
+// Size of a compute group of particles.
 #define PARTICLE_GROUP 64
 
 // Edge of a tile of front depths, in pixels.
@@ -24,17 +25,25 @@
 #define PATTERN_BODY_SPLASH 5
 #define PATTERN_BODY_BODY 6
 
-// How a pixel's walk ended. Past a jump: every surface was found, but on the way to one the map ahead jumped, and an
-// unseen wall may stand before it, or beside it, where it is not interpolated. Other wall: every surface was found, one of
-// them across the ray's way. Scene: the ray ended on the host's scene.
+// How a pixel's walk ended.
+// No particle covers the pixel.
 #define OUTCOME_NO_LIQUID 0
+// Every surface was found where a ray would meet it.
 #define OUTCOME_HIT 1
+// The ray crossed the border of the view inside the liquid, or looking for a second volume.
 #define OUTCOME_LEFT_VIEW 2
+// The map ahead ended, or jumped, where the ray would leave the liquid.
 #define OUTCOME_HOLE 3
+// MARCH_STEPS did not reach the end of the ray.
 #define OUTCOME_NOT_CONVERGED 4
+// One more internal reflection than a walk may have.
 #define OUTCOME_REFLECTION_LIMIT 5
+// Every surface was found, but the map jumped before one of the hits, or within its footprint: a wall that no map holds may
+// stand before it.
 #define OUTCOME_PAST_JUMP 6
-#define OUTCOME_OTHER_WALL 7
+// Every surface was found, one of them on the map of the side that the ray runs away from.
+#define OUTCOME_OPPOSITE_WALL 7
+// The ray ended on the host's scene.
 #define OUTCOME_SCENE 8
 
 // Which particles a class draws on which side; bits of the cull pass's verdict.
@@ -42,10 +51,12 @@
 #define VISIBLE_BACK 2
 #define VISIBLE_BODY 4 // set where the particle belongs to the body
 
-// Culling: particles of more pixels an edge are always drawn and hide nothing; room for the rounding of a discriminant of
-// order one, and of a depth in particle radii. Compilers may round the same formula differently in different shaders.
+// Culling: particles that cover more pixels than this along an edge are always drawn and hide nothing.
 #define LARGE 64
+// Room for the rounding of a ray cast's discriminant, which is of order one. Compilers may round the same formula
+// differently in different shaders.
 #define SILHOUETTE 0.0001
+// Room for the rounding of a ray cast's depth, in particle radii.
 #define DEPTH_ROUNDING 0.001
 
 // Items that one group of 64 sorts or compacts.
@@ -72,75 +83,100 @@
 #define COUNT_CLAMPED_RATIO 16
 #define COUNTERS 17
 
-// Words of the extent buffer: smallest and largest coordinates (as integers in the order of the floats), the occupied
-// cells (first, last), bits of each axis that a sort key needs, passes of the sort, for each pass that there could
-// be the indirect dispatches of its blocks and of its rows, and the origin of the liquid's own space.
+// Words of the extent buffer.
+// Smallest coordinates, as integers in the order of the floats.
 #define EXTENT_LEAST 0
+// Largest coordinates.
 #define EXTENT_MOST 3
+// First occupied cell.
 #define EXTENT_FIRST_CELL 6
+// Last occupied cell.
 #define EXTENT_LAST_CELL 9
+// Bits of each axis that a sort key needs.
 #define EXTENT_BITS 12
+// Passes of the sort.
 #define EXTENT_PASSES 15
+// For each of SORT_PASSES: the indirect dispatch of its blocks, then that of its rows.
 #define EXTENT_DISPATCH 16
+// Origin of the liquid's own space.
 #define EXTENT_ORIGIN 136
 #define EXTENT_WORDS 139
 
-// A sort pass orders by so many bits; keys of three 31-bit cell coordinates need so many passes at most.
+// Bits of the key that one pass of the sort orders by.
 #define DIGIT_BITS 5
+// Values of so many bits.
 #define DIGITS 32
+// Passes that a key of three 31-bit cell coordinates needs.
 #define SORT_PASSES 20
 
-// Of a run of more candidates for neighbours than this (of those in a particle's cell of the relation table), evenly chosen
-// ones stand for all: a run of five cells holds 40 in liquid at rest, and the 27 cells 1728.
+// Largest run of candidates for neighbours that is looked at whole; of a longer one evenly chosen candidates stand for all.
+// A run of five cells holds 40 in liquid at rest.
 #define CROWD 1024
+// The same for a run of the relation table: 27 cells, twice as wide, hold 1728 in liquid at rest.
 #define CROWD_RELATION 8192
 
-// Particles one invocation prepares, one a component of a vector.
+// Particles that one invocation prepares together, one in each component of a vector.
 #define SHAPE_RUN 4
 
-// Below this share of the filled body's variance neighbours lie on one spot: their spread says nothing about a shape.
-#define DEGENERATE_SHARE 0.05
+// Neighbours whose largest variance is below this fraction of a filled body's lie on one spot: their spread says nothing about
+// a shape.
+#define DEGENERATE_VARIANCE 0.05
 
-// Plane fitting: below this |n.v| eq. (5) is not trusted; an update longer than this many sigma is not taken.
+// Plane fitting: the least |n.v|, both of unit length, for which eq. (5) of Imai16 is trusted.
 #define FIT_GRAZING_LIMIT 0.01
+// The longest update of a depth that is taken, in sigma.
 #define FIT_UPDATE_LIMIT 4.0
 
-// Search along a ray: secant steps; pixels from sample to sample where an earlier wall is looked for, least and most, and
-// how many samples at most; pixels from sample to sample in a pixel with a front near the ray, and samples at most; how
-// far into the next pixel its address is taken; pixels from sample to sample of the march to an exit, least and most;
-// steps of a march at most; refinements of a bracket, and of the place where a surface begins.
+// Searches along a ray (search.glsl). Steps of the secant method towards an exit.
 #define SECANT_STEPS 10
+// After the secant method: pixels between two looks for an earlier wall, at least.
 #define CHECK_PIXELS 1.0
+// ... and at most.
 #define CHECK_STRIDE 8.0
+// Looks, at most.
 #define CHECK_STEPS 64
+// Entry: pixels between two samples within a pixel whose front surface is near the ray.
 #define ENTRY_PIXELS 0.125
+// Samples within a pixel, at most.
 #define ENTRY_STEPS 12
+// How far into the next pixel or tile a position is taken that lies on the edge between two, in pixels.
 #define PIXEL_NUDGE 0.001
+// March to an exit: pixels between two samples near a wall.
 #define EXIT_PIXELS 1.0
+// ... and far from any.
 #define EXIT_STRIDE 16.0
+// Steps of a march, at most.
 #define MARCH_STEPS 1024
+// Steps that narrow a bracket, at most.
 #define REFINE_STEPS 24
+// Halvings that find where a surface begins.
 #define EDGE_STEPS 10
 
-// The host's scene: as a share of its depth, how far behind it a ray may come to lie from one pixel to the next and still
-// meet it; a floor seen at 5 degrees falls off so much in a picture of 768 rows. And how near before it, in particle radii,
-// the liquid's wall may lie and still wet it: particles stop a radius before a floor, and ellipsoids shrunk as YuTurk13 has
-// it two and a half radii more.
-#define SCENE_BEHIND 0.01
-#define WETTED 3.5
-// Sine of the flattest ray for which that distance is measured across the wall.
-#define WETTED_FLAT 0.02
-
-// Tangent of the steepest surface (81 degrees against the view plane) for which strides are made short.
-#define STEEP 6.0
-
-// Largest |f| of an accepted hit, in particle radii and in what a pixel covers in the middle of the liquid, whichever is
-// more; largest spread of the depths around a sample that is still interpolated, in radii (in pixels: STEEP).
+// A hit is a root of f with |f| no larger than this, in particle radii,
 #define ACCEPTED 0.05
+// or than this part of what a pixel covers in the middle of the liquid, whichever is more.
 #define ACCEPTED_PIXELS 0.1
+// Depths of a footprint that differ by more are a jump, and not interpolated: in particle radii, or what a STEEP surface
+// changes from pixel to pixel in the middle of the liquid, whichever is more.
 #define JUMP 2.0
+// Tangent of the angle against the view plane (81 degrees) of the steepest surface that counts as continuous.
+#define STEEP 6.0
+// A root is found where |f| is no larger than this, in particle radii,
+#define CONVERGED 0.001
+// or than this fraction of the farthest depth, where float32 has no finer steps.
+#define CONVERGED_DEPTH 0.000001
 
-// One particle, as drawn: eye-independent, in the liquid's own space (src/space.rs: lengths in particle radii). In memory it is three arrays of three floats, with the class as a sign (see particles.glsl).
+// A ray meets the host's scene between two pixels where it lies no further behind the second one's depth than this fraction of
+// it: a floor seen at 5 degrees falls off so much from row to row in a picture of 768 rows.
+#define SCENE_BEHIND 0.01
+// Liquid whose wall lies no further before the scene than this, in particle radii and along the wall's normal, wets it:
+// particles stop a radius before a floor, and ellipsoids shrunk as YuTurk13 has it two and a half radii more.
+#define WETTING_GAP 3.5
+// Sine of the flattest ray for which that distance is measured along the normal.
+#define WETTING_FLAT 0.02
+
+// One particle, as drawn: eye-independent, in the liquid's own space (src/space.rs: lengths in particle radii). In memory it
+// is three arrays of three floats, with the class as a sign (see particles.glsl).
 struct Particle {
     vec4 center;         // xyz: position
     vec4 shape_diagonal; // xx, yy, zz of S = A A^T, A's columns the semi-axes
@@ -150,36 +186,64 @@ struct Particle {
 // One frame's parameters. All lengths are in particle radii. Eye space looks down -z; d = -z is the linear depth; a view
 // ray is v = (vx, vy, -1).
 struct Frame {
-    mat4 view;         // the liquid's space to eye space: a rotation or reflection, and a shift
-    mat4 eye_to_env;   // rotation from eye space to the environment map's space (+y up)
-    vec4 to_pixel;     // ax, ay, bx, by: pixel = a * v.xy + b
-    vec4 viewport;     // width, height in pixels; near plane; unused
-    vec4 smoothing;    // sigma; largest update; grazing limit; unused
-    vec4 search;       // converged |f|; accepted |f|; largest depth spread that is interpolated; index of refraction
-    vec4 absorption;   // rgb coefficient; w unused
-    vec4 bounds_min;   // box around everything drawn
-    vec4 bounds_max;
-    vec4 scene;        // host scene: P22, P23 over the radius, cleared depth value; w: 1 if the eye is inside the body
-    uvec4 particles;   // count; unused; largest point size in pixels; 1 to draw quads only
+    mat4 view;            // the liquid's space to eye space: a rotation or reflection, and a shift
+    mat4 eye_to_env;      // rotation from eye space to the environment map's space (+y up)
+    vec2 pixel_scale;     // pixel = pixel_scale * v.xy + pixel_origin; either scale may be negative
+    vec2 pixel_origin;
+    vec2 size;            // of the view, in pixels
+    float near;           // depth before which no liquid is drawn
+    float ior;            // index of refraction of the liquid against air
+    vec3 absorption;      // coefficient for red, green and blue
+    float eye_inside;     // 1 if the eye is inside the body, else 0
+    vec3 bounds_min;      // box around everything drawn, in the liquid's space
+    uint count;           // particles
+    vec3 bounds_max;
+    uint largest_point;   // edge of the largest point that the device draws, in pixels
+    float scene_z_scale;  // the host's scene: the projection's element (3, 3)
+    float scene_z_offset; // the projection's element (3, 4), over the radius
+    float scene_cleared;  // value of the depth buffer where nothing was drawn
+    uint quads_only;      // 1 to draw no points
 };
 
-// Indirect draws of one class and side: points, then quads (VkDrawIndirectCommand each).
+// Indirect draws of one class and side, two VkDrawIndirectCommand: one of points and one of quads.
 struct Draws {
-    uvec4 points; // vertices, instances, first vertex, first instance
-    uvec4 quads;
+    uint point_vertices;
+    uint point_instances;
+    uint point_first_vertex;
+    uint point_first_instance;
+    uint quad_vertices;
+    uint quad_instances;
+    uint quad_first_vertex;
+    uint quad_first_instance;
 };
 
 // Push constants of the preparation. Lengths are world units times a power of two that brings the radius into 1..2: that
 // rounds nothing, and squares of lengths stay within float32 at any scale.
 struct Prepare {
-    uvec4 source;   // particles; where positions begin and how far apart they are, in words; entries a particle has in the sort
-    vec4 lengths;   // edge of a cell; particle radius r; support h; reach of the neighbours that shape ellipsoids, 2 h
-    vec4 classes;   // splash below this share of the filled body's density; last class kept below this one; sum of a filled body's weights; the power of two
-    vec4 shape;     // lambda; 1 / largest ratio of semi-axes; longest semi-axis and variance of a filled body in r and its square
-    uvec4 options;  // fewest neighbours; pass of the sort; 1 if last classes are there; cells to either side that hold neighbours
+    uint count;                // particles
+    uint first_word;           // where positions begin in their buffer
+    uint word_stride;          // words from one position to the next
+    uint entries_per_particle; // in the sort: 1, or 27 of the relation table
+    float cell_edge;
+    float radius;              // particle radius r
+    float support;             // h, of the number density's kernel
+    float reach;               // of the neighbours that shape ellipsoids, 2 h
+    float splash_below;        // a splash has less than this fraction of a filled body's density
+    float keep_below;          // below this fraction the last frame's class is kept
+    float filled_density;      // sum of a filled body's weights
+    float unit_scale;          // the power of two
+    float smoothing;           // lambda of YuTurk13
+    float least_ratio;         // 1 / largest ratio of semi-axes
+    float longest_axis;        // longest semi-axis, in r
+    float filled_variance;     // of a filled body's neighbours, in r squared
+    uint min_neighbours;       // with fewer a particle stays a sphere
+    uint sort_pass;
+    uint has_last_classes;     // 1 if the last frame left classes
+    uint cells_around;         // cells to either side of a particle's own that hold neighbours
 };
 
 // Push constants of the splat pass.
 struct Splat {
-    uvec4 what; // class, side, 2 unused
+    uint cls;  // which class is drawn
+    uint side; // and which side of it
 };

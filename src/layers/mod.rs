@@ -1,5 +1,7 @@
 //! Which surfaces are kept of the particles: maps of linear depth and normals, nearest fronts and farthest backs.
 
+pub mod front;
+pub mod nearest_farthest;
 mod splat;
 pub mod split;
 
@@ -15,6 +17,8 @@ family! {
     /// Which surfaces are kept of the particles.
     pub enum Layers: Layering {
         Split(split) = "split",
+        NearestFarthest(nearest_farthest) = "nearest-farthest",
+        Front(front) = "front",
     }
 }
 
@@ -22,17 +26,47 @@ family! {
 pub(crate) trait Layering {
     /// What its maps can be asked for.
     fn offers(&self) -> Offers;
+    /// Whether particles of the body that others hide may be left out.
+    fn may_cull(&self, scene: &Scene) -> bool;
     /// Draws them.
-    fn record(&self, plan: &mut Plan, scene: &Scene, drawn: &Drawn) -> Surfaces;
+    fn record(&self, plan: &mut Plan, scene: &Scene, drawn: &Drawn) -> Layered;
 }
 
-/// The liquid's surfaces; classes without particles have none.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Surfaces {
+/// What layers are drawn as; what there is nothing of is not there.
+#[derive(Clone, Copy)]
+pub(crate) struct Layered {
     /// Particles on their own.
     pub splash: Option<Surface>,
-    /// Those that form a body, which is what is smoothed.
+    /// Those that form a body, or all of them where the layers do not tell them apart: what is smoothed.
+    pub body: Option<Body>,
+    /// Length of view rays inside particles, in particle radii, all of them added (`R32_SFLOAT`, no layers).
+    pub thickness: Option<Target>,
+}
+
+/// A surface before it is smoothed.
+#[derive(Clone, Copy)]
+pub(crate) struct Body {
+    /// As of [`Surface::depth`].
+    pub depth: Target,
+    /// As of [`Surface::normal`], of the particles; not all layers have them.
+    pub normal: Option<Target>,
+    /// Layers: 1 or 2.
+    pub sides: u32,
+}
+
+impl From<Surface> for Body {
+    fn from(s: Surface) -> Body {
+        Body { depth: s.depth, normal: Some(s.normal), sides: s.sides }
+    }
+}
+
+/// The liquid's surfaces, smoothed; classes without particles have none.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Surfaces {
+    pub splash: Option<Surface>,
     pub body: Option<Surface>,
+    /// As of [`Layered::thickness`].
+    pub thickness: Option<Target>,
 }
 
 /// Maps of one class. Layer 0 is the nearest front, layer 1, if there is one, the farthest back.

@@ -1,23 +1,41 @@
 //! Splashes apart from the body: four surfaces, two of each (Imai16 §4.2).
 
-use super::{Layering, Surfaces, splat};
-use crate::{frame::Scene, method::Offers, parameters::parameters, passes::Drawn, plan::Plan, shader};
+use super::{
+    Body, Layered, Layering,
+    splat::{self, Names},
+};
+use crate::{
+    frame::Scene,
+    method::Offers,
+    parameters::parameters,
+    passes::Drawn,
+    plan::Plan,
+    shader::{CLASS_BODY, CLASS_SPLASH},
+};
 
 parameters! {
     /// Splashes apart from the body: nearest front and farthest back of each (Imai16 §4.2).
     pub struct Split {}
 }
 
+const SPLASH: Names = Names { depth: "splash depth", normal: "splash normal", passes: ["splash front", "splash back"] };
+pub(super) const BODY: Names =
+    Names { depth: "body depth (ray-cast)", normal: "body normal (ray-cast)", passes: ["body front", "body back"] };
+
 impl Layering for Split {
     fn offers(&self) -> Offers {
-        Offers { backs: true, normals: true }
+        Offers { backs: true, normals: true, thickness: false }
     }
 
-    fn record(&self, plan: &mut Plan, scene: &Scene, drawn: &Drawn) -> Surfaces {
-        let surface = |plan: &mut Plan, class, there: bool| there.then(|| splat::draw(plan, scene, drawn, class));
-        Surfaces {
-            splash: surface(plan, shader::CLASS_SPLASH, scene.splash),
-            body: surface(plan, shader::CLASS_BODY, scene.body),
-        }
+    fn may_cull(&self, _: &Scene) -> bool {
+        true
+    }
+
+    fn record(&self, plan: &mut Plan, scene: &Scene, drawn: &Drawn) -> Layered {
+        let sides = scene.sides();
+        let mut surface = |class, names| splat::surface(plan, scene, drawn, &[class], sides, names);
+        let splash = scene.splash.then(|| surface(CLASS_SPLASH, &SPLASH));
+        let body = scene.body.then(|| surface(CLASS_BODY, &BODY));
+        Layered { splash, body: body.map(Body::from), thickness: None }
     }
 }

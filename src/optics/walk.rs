@@ -39,7 +39,7 @@ impl Walk {
         let (body, splash) = (surfaces.body.unwrap_or(any), surfaces.splash.unwrap_or(any));
         // Where rays outside the liquid need not look for a second volume.
         let second = self.refractions == 4 && scene.count > 0;
-        let tiles = if second { tiles::record(plan, scene, &body, &splash) } else { body.depth };
+        let tiles = if second { tiles::record(plan, surfaces, &body, &splash) } else { body.depth };
 
         let has_scene = scene.has_scene;
         let cube = scene.environment == EnvironmentShape::Cube;
@@ -54,8 +54,8 @@ impl Walk {
             .constant("REFRACTIONS", self.refractions)
             .constant("INTERNAL_REFLECTIONS", self.internal_reflections)
             .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact)
-            .constant("HAS_SPLASH", scene.splash)
-            .constant("HAS_BODY", scene.body)
+            .constant("HAS_SPLASH", surfaces.splash.is_some())
+            .constant("HAS_BODY", surfaces.body.is_some())
             .constant("ENCODE_SRGB", scene.encode_srgb())
             .constant("HOST_BACKGROUND", scene.background == Background::Host);
         if has_scene {

@@ -17,8 +17,8 @@ pub(crate) fn record(plan: &mut Plan, scene: &Scene, particles: &Arrays, bounds:
         .read("bounds", bounds.unwrap_or(particles.centers))
         .write("visible", visible)
         .update("counters", counters(plan))
-        .constant("OCCLUSION", bounds.is_some())
-        .constant("BACK", scene.sides() == 2);
+        .constant("OCCLUSION_CULLING", bounds.is_some())
+        .constant("BACK_SIDES", scene.sides() == 2);
     plan.dispatch("cull", call, per_particle(scene.count));
     visible
 }

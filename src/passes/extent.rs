@@ -16,15 +16,11 @@ pub(crate) fn record(plan: &mut Plan, scene: &Scene, prepare: &Prepare) -> Targe
     let least = 4 * u64::from(EXTENT_MOST);
     plan.fill("extent", extent, 0, least, u32::MAX);
     plan.fill("extent", extent, least, vk::WHOLE_SIZE, 0);
-    let reduce = Call::compute(&EXTENT_REDUCE_COMP);
-    let find = Call::compute(&EXTENT_PLAN_COMP).update("frame", frame);
+    let reduce = Call::compute(&EXTENT_REDUCE_COMP).update("counters", counters);
+    let relation = prepare.entries_per_particle != 1;
+    let find = Call::compute(&EXTENT_PLAN_COMP).update("frame", frame).constant("RELATION_TABLE", relation);
     for (call, groups) in [(reduce, per_block(scene.count)), (find, Groups::Direct([1, 1, 1]))] {
-        let call = call
-            .read("positions", positions)
-            .update("extent", extent)
-            .update("counters", counters)
-            .constant("RELATION", prepare.source.w != 1)
-            .push_all(prepare);
+        let call = call.read("positions", positions).update("extent", extent).push_all(prepare);
         plan.dispatch("extent", call, groups);
     }
     extent

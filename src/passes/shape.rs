@@ -34,10 +34,10 @@ pub(crate) fn record(
         .read("sorted", sorted.positions)
         .write("centers", arrays.centers)
         .write("diagonals", arrays.diagonals)
-        .write("mixed_parts", arrays.mixed)
+        .write("mixed", arrays.mixed)
         .update("counters", counters)
         .update("last_classes", classes)
-        .constant("RELATION", preparation.constants.source.w != 1)
+        .constant("RELATION_TABLE", preparation.constants.entries_per_particle != 1)
         .constant("KEEP_CLASSES", preparation.keep_classes)
         .push_all(&preparation.constants);
     if listed {

@@ -25,21 +25,22 @@ pub(crate) fn record(plan: &mut Plan, scene: &Scene, preparation: &Preparation, 
     let positions = plan.given(External::Positions);
     let mut prepare = preparation.constants;
     let step = |shader: &'static Shader, prepare: &Prepare| {
-        let call = Call::compute(shader).read("positions", positions).read("extent", extent);
-        call.constant("RELATION", preparation.constants.source.w != 1).push_all(prepare)
+        let relation = preparation.constants.entries_per_particle != 1;
+        Call::compute(shader).constant("RELATION_TABLE", relation).push_all(prepare)
     };
+    let keys = |call: Call| call.read("positions", positions).read("extent", extent);
     for pass in 0..SORT_PASSES {
-        prepare.options.y = pass;
+        prepare.sort_pass = pass;
         // How many of these passes the occupied cells need only the device knows: the others are empty.
         let (blocks, rows) = (4 * u64::from(EXTENT_DISPATCH + 6 * pass), 4 * u64::from(EXTENT_DISPATCH + 6 * pass + 3));
-        let count = step(&SORT_COUNT_COMP, &prepare).read("order", order).update("sums", sums);
+        let count = keys(step(&SORT_COUNT_COMP, &prepare)).read("order", order).update("sums", sums);
         let scan = step(&SORT_SCAN_COMP, &prepare).update("sums", sums);
-        let scatter = step(&SORT_SCATTER_COMP, &prepare).update("order", order).read("sums", sums);
+        let scatter = keys(step(&SORT_SCATTER_COMP, &prepare)).update("order", order).read("sums", sums);
         for (call, arguments) in [(count, blocks), (scan, rows), (scatter, blocks)] {
             plan.dispatch("sort", call, Groups::Indirect(extent, arguments));
         }
     }
-    let gather = step(&SORT_GATHER_COMP, &prepare).update("order", order).write("sorted", sorted);
+    let gather = keys(step(&SORT_GATHER_COMP, &prepare)).update("order", order).write("sorted", sorted);
     plan.dispatch("sort", gather, per_particle(scene.count));
     Sorted { order, positions: sorted }
 }

@@ -28,6 +28,10 @@ pub(crate) enum Blend {
     /// It replaces that.
     #[default]
     Replace,
+    /// It is added to that.
+    Add,
+    /// The larger of the two stays, component by component.
+    Largest,
 }
 
 impl Recipe {

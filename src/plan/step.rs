@@ -60,8 +60,8 @@ pub(crate) struct Rendering {
 pub(crate) struct Color {
     pub target: Target,
     pub layer: u32,
-    /// Whether it keeps what it holds; it starts as zeros if not.
-    pub keep: bool,
+    /// What it starts as; `None`: it keeps what it holds.
+    pub clear: Option<[f32; 4]>,
     pub blend: Blend,
 }
 
@@ -80,14 +80,22 @@ impl Rendering {
 
     /// And into one layer of another, from zeros.
     pub fn and(mut self, target: Target, layer: u32) -> Rendering {
-        self.colors.push(Color { target, layer, keep: false, blend: Blend::Replace });
+        self.colors.push(Color { target, layer, clear: Some([0.0; 4]), blend: Blend::Replace });
         self
     }
 
-    /// The last attachment keeps what it holds.
+    /// The last attachment keeps what it holds, if `keep`.
     pub fn keeping(mut self, keep: bool) -> Rendering {
+        if let Some(color) = self.colors.last_mut().filter(|_| keep) {
+            color.clear = None;
+        }
+        self
+    }
+
+    /// The last attachment starts as this, and what is drawn is blended with what is there.
+    pub fn blending(mut self, blend: Blend, clear: [f32; 4]) -> Rendering {
         if let Some(color) = self.colors.last_mut() {
-            color.keep = keep;
+            (color.blend, color.clear) = (blend, Some(clear));
         }
         self
     }

@@ -3,11 +3,11 @@
 use super::{Options, PrepareError, Search, density::rest_density, ellipsoids::lattice_variance, options::Scale};
 use crate::{Error, shader::Prepare, space};
 use ash::vk;
-use glam::{UVec4, Vec4};
 
 /// Positions in device memory, to be prepared within the frame that draws them: neighbours, classes and ellipsoids as
 /// [`super::prepare`] makes them, but on the GPU, and with no word about them to the host.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct DevicePositions {
     /// The host's buffer, with usage `STORAGE_BUFFER`: three 32-bit floats a particle, in world units. A position that is
     /// not finite is left out.
@@ -32,6 +32,24 @@ impl DevicePositions {
     pub fn packed(buffer: vk::Buffer, count: u32, radius: f32) -> DevicePositions {
         let options = Options::default();
         DevicePositions { buffer, offset: 0, stride: 12, count, radius, options, keep_class_below: None }
+    }
+
+    /// The same, beginning at a byte of the buffer and lying so many bytes apart.
+    #[must_use]
+    pub fn laid_out(self, offset: u64, stride: u64) -> Self {
+        DevicePositions { offset, stride, ..self }
+    }
+
+    /// The same with other options.
+    #[must_use]
+    pub fn options(self, options: Options) -> Self {
+        DevicePositions { options, ..self }
+    }
+
+    /// The same with hysteresis: see [`DevicePositions::keep_class_below`].
+    #[must_use]
+    pub fn keep_class_below(self, share: impl Into<Option<f32>>) -> Self {
+        DevicePositions { keep_class_below: share.into(), ..self }
     }
 
     /// Entries a particle has in the sort, and the edge of a cell in supports.
@@ -69,29 +87,27 @@ impl DevicePositions {
         let (entries, supports) = self.layout();
         let power = space::power_of_two(self.radius);
         let o = &self.options;
-        let relative = scale.support / scale.radius;
-        let upper = self.keep_class_below.unwrap_or(o.splash_threshold);
         Ok(Prepare {
-            source: UVec4::new(self.count, (begin / 4) as u32, (self.stride / 4) as u32, entries),
-            lengths: Vec4::new(
-                (scale.support * supports) as f32 * power,
-                self.radius * power,
-                scale.support as f32 * power,
-                scale.reach() as f32 * power,
-            ),
-            classes: Vec4::new(o.splash_threshold, upper, rest_density(relative) as f32, power),
-            shape: Vec4::new(
-                o.smoothing,
-                o.max_ratio.recip(),
-                o.max_semi_axis,
-                lattice_variance(scale.reach() / scale.radius) as f32,
-            ),
-            options: UVec4::new(
-                u32::try_from(o.min_neighbours).unwrap_or(u32::MAX).min(u32::MAX - 1),
-                0,
-                0,
-                (2.0 / supports) as u32,
-            ),
+            count: self.count,
+            first_word: (begin / 4) as u32,
+            word_stride: (self.stride / 4) as u32,
+            entries_per_particle: entries,
+            cell_edge: (scale.support * supports) as f32 * power,
+            radius: self.radius * power,
+            support: scale.support as f32 * power,
+            reach: scale.reach() as f32 * power,
+            splash_below: o.splash_threshold,
+            keep_below: self.keep_class_below.unwrap_or(o.splash_threshold),
+            filled_density: rest_density(scale.support / scale.radius) as f32,
+            unit_scale: power,
+            smoothing: o.smoothing,
+            least_ratio: o.max_ratio.recip(),
+            longest_axis: o.max_semi_axis,
+            filled_variance: lattice_variance(scale.reach() / scale.radius) as f32,
+            min_neighbours: u32::try_from(o.min_neighbours).unwrap_or(u32::MAX).min(u32::MAX - 1),
+            sort_pass: 0,
+            has_last_classes: 0,
+            cells_around: (2.0 / supports) as u32,
         })
     }
 }

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::density::lattice;
 use super::neighbours::{Grid, Neighbour};
 use super::options::{Options, Scale};
-use crate::{particles::Ellipsoid, shader::DEGENERATE_SHARE};
+use crate::{particles::Ellipsoid, shader::DEGENERATE_VARIANCE};
 
 /// How an ellipsoid came about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,7 +79,7 @@ impl<'a> Fitter<'a> {
         }
         mean /= sum;
         let (variances, frame) = eigen_symmetric(covariance * (1.0 / sum) - outer(mean, mean));
-        if variances.x < f64::from(DEGENERATE_SHARE) * self.full {
+        if variances.x < f64::from(DEGENERATE_VARIANCE) * self.full {
             return (sphere, Shape::Degenerate);
         }
 

@@ -5,7 +5,7 @@ mod normals;
 pub mod plane_fit;
 
 use crate::{
-    layers::Surface,
+    layers::{Body, Surface},
     method::Offers,
     parameters::family,
     plan::{Groups, Plan, Target},
@@ -26,13 +26,14 @@ pub(crate) trait Filter {
         Offers::default()
     }
     /// Smooths the depths of all sides of the body; gives the target that holds the result, which may be the body's own.
-    fn record(&self, plan: &mut Plan, body: &Surface) -> Target;
+    fn record(&self, plan: &mut Plan, body: &Body) -> Target;
 }
 
 /// The body, smoothed: its depths by the filter, its normals from them.
-pub(crate) fn record(plan: &mut Plan, filter: &Smooth, body: &Surface) -> Surface {
+pub(crate) fn record(plan: &mut Plan, filter: &Smooth, body: &Body) -> Surface {
     let depth = filter.member().record(plan, body);
-    let normal = if depth == body.depth { body.normal } else { normals::record(plan, body, depth) };
+    let own = body.normal.filter(|_| depth == body.depth);
+    let normal = own.unwrap_or_else(|| normals::record(plan, body, depth));
     Surface { depth, normal, sides: body.sides }
 }
 

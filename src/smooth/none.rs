@@ -2,7 +2,7 @@
 
 use super::Filter;
 use crate::{
-    layers::Surface,
+    layers::Body,
     parameters::parameters,
     plan::{Plan, Target},
 };
@@ -13,7 +13,7 @@ parameters! {
 }
 
 impl Filter for Unsmoothed {
-    fn record(&self, _: &mut Plan, body: &Surface) -> Target {
+    fn record(&self, _: &mut Plan, body: &Body) -> Target {
         body.depth
     }
 }

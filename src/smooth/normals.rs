@@ -2,7 +2,7 @@
 
 use super::per_pixel;
 use crate::{
-    layers::Surface,
+    layers::Body,
     passes::counters,
     plan::{Call, Plan, Target},
     shader::{IMAGE_GROUP, NORMALS_COMP},
@@ -10,14 +10,17 @@ use crate::{
 use ash::vk::Format;
 
 /// From depths, as a filter left them.
-pub(super) fn record(plan: &mut Plan, body: &Surface, depth: Target) -> Target {
+pub(super) fn record(plan: &mut Plan, body: &Body, depth: Target) -> Target {
     let normal = plan.map("body normal (smoothed)", Format::R32_UINT, body.sides);
     let counters = counters(plan);
-    let call = Call::compute(&NORMALS_COMP)
+    let mut call = Call::compute(&NORMALS_COMP[usize::from(body.normal.is_some())])
         .read("depth_in", depth)
-        .read("normal_raw", body.normal)
         .write("normal_out", normal)
         .update("counters", counters);
+    // Where differences say nothing the particle's own normal stays, if there is one.
+    if let Some(raw) = body.normal {
+        call = call.read("normal_raw", raw);
+    }
     let groups = per_pixel(plan, IMAGE_GROUP, body.sides);
     plan.dispatch("normals", call, groups);
     normal

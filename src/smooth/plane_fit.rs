@@ -2,7 +2,7 @@
 
 use super::{Filter, per_pixel};
 use crate::{
-    layers::Surface,
+    layers::Body,
     method::Offers,
     parameters::{choices, parameters},
     passes::counters,
@@ -47,10 +47,12 @@ impl Filter for PlaneFit {
         Offers { normals: true, ..Offers::default() }
     }
 
-    fn record(&self, plan: &mut Plan, body: &Surface) -> Target {
+    fn record(&self, plan: &mut Plan, body: &Body) -> Target {
         let reach = self.window / 2;
         let edge = tile(reach);
         let counters = counters(plan);
+        // Asked for, so there (`Filter::asks`).
+        let Some(normal) = body.normal else { return body.depth };
         let mut from = body.depth;
         // The two that iterations alternate between; the second only if there is a second iteration.
         let mut targets = ["body depth (smoothed, odd)", "body depth (smoothed, even)"]
@@ -62,13 +64,14 @@ impl Filter for PlaneFit {
             let to = targets[0];
             let call = Call::compute(&PLANE_FIT_COMP)
                 .read("depth_in", from)
-                .read("normal_raw", body.normal)
+                .read("normal_raw", normal)
                 .write("depth_out", to)
                 .update("counters", counters)
                 .constant("local_size_x", edge)
                 .constant("local_size_y", edge)
-                .constant("REACH", reach)
-                .constant("EUCLIDEAN", self.weighting == Weighting::Euclidean);
+                .constant("HALF_WINDOW", reach)
+                .constant("EUCLIDEAN", self.weighting == Weighting::Euclidean)
+                .push("sigma", self.sigma);
             let groups = per_pixel(plan, edge, body.sides);
             plan.dispatch("plane fit", call, groups);
             from = to;

@@ -21,7 +21,7 @@ pub struct Scene<'a> {
 
 impl Maps<'_> {
     fn index(&self, pixel: [usize; 2]) -> usize {
-        pixel[1] * self.frame.viewport.x as usize + pixel[0]
+        pixel[1] * self.frame.size.x as usize + pixel[0]
     }
 
     /// Linear depth of the host's scene at a pixel; infinite without one.
@@ -29,11 +29,12 @@ impl Maps<'_> {
         self.scene.map_or(f64::INFINITY, |s| s.depth[self.index(pixel)])
     }
 
-    /// Where a ray first meets the scene, in steps of an eighth of a pixel: it passes a pixel's depth, or comes into a pixel from before the
-    /// scene to hardly behind it. Further behind, an object stands between it and the eye.
+    /// Where a ray first meets the scene, in steps of an eighth of a pixel: it reaches the pixel's depth within the
+    /// pixel, or comes into the pixel a little behind that depth and was in front of the scene until there. Where it
+    /// comes in further behind, it passes behind an object.
     pub fn meets_scene(&self, ray: &Ray) -> Option<(f64, [usize; 2])> {
         self.scene?;
-        let slope = f64::from(STEEP / self.frame.to_pixel.x.abs());
+        let slope = f64::from(STEEP / self.frame.pixel_scale.x.abs());
         let pixel_at = |t: f64| self.clamped(self.project(ray.at(t)));
         let behind = |t: f64, pixel| -ray.at(t).z - self.scene_depth(pixel);
         // Whether it was in front of the scene before this pixel, and whether it just came into it.
@@ -46,10 +47,10 @@ impl Maps<'_> {
                 return Some((last, pixel));
             }
             let next = self.next_on_screen(ray, last);
-            let other = pixel_at(next);
+            let next_pixel = pixel_at(next);
             // As far as the ray stays in this pixel, and where it comes into the next.
             let (stays, comes) =
-                if other == pixel { (next, next) } else { bisect(last, next, |t| pixel_at(t) == other) };
+                if next_pixel == pixel { (next, next) } else { bisect(last, next, |t| pixel_at(t) == next_pixel) };
             if on_entering <= 0.0 && behind(stays, pixel) >= 0.0 {
                 return Some((bisect(last, stays, |t| behind(t, pixel) >= 0.0).1, pixel));
             }
@@ -57,8 +58,8 @@ impl Maps<'_> {
                 return None;
             }
             before = behind(stays, pixel) <= 0.0;
-            entered = other != pixel;
-            (last, pixel) = (comes, other);
+            entered = next_pixel != pixel;
+            (last, pixel) = (comes, next_pixel);
         }
     }
 
@@ -84,7 +85,7 @@ impl Maps<'_> {
     }
 }
 
-/// The two ends of the place, between a and b, where something becomes true.
+/// Narrows the bracket from a to b in which something becomes true.
 fn bisect(mut a: f64, mut b: f64, yet: impl Fn(f64) -> bool) -> (f64, f64) {
     for _ in 0..60 {
         let t = 0.5 * (a + b);

@@ -19,7 +19,7 @@ pub struct Normals {
 
 /// Normals of `depth` (row by row); `raw` are those of the ray cast, `side` is the layer.
 pub fn normals(frame: &Frame, depth: &[f32], raw: &[u32], side: u32) -> Normals {
-    let (width, height) = (frame.viewport.x as i32, frame.viewport.y as i32);
+    let (width, height) = (frame.size.x as i32, frame.size.y as i32);
     // Eye-space point of a pixel, if it has a surface.
     let point = |x: i32, y: i32| {
         let inside = (0..width).contains(&x) && (0..height).contains(&y);

@@ -4,7 +4,10 @@
 //! formulas stand as printed, in 64 bits, on eye-space points.
 
 use super::normal::decode_normal;
-use crate::{shader::Frame, smooth::plane_fit::Weighting};
+use crate::{
+    shader::{FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT, Frame},
+    smooth::plane_fit::{PlaneFit, Weighting},
+};
 use glam::{DVec2, DVec3};
 
 /// What a window's plane is, and eq. (5) makes of it.
@@ -54,11 +57,11 @@ impl Fit {
 /// Below this agreement the sum of normals has no direction.
 pub const LEAST_AGREEMENT: f64 = 1e-6;
 
-/// Fits every pixel of one layer; `depth` and `normal` (packed, unsmoothed) row by row, `window` in pixels.
-pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], window: u32, weighting: Weighting) -> Fit {
-    let (width, height) = (frame.viewport.x as i32, frame.viewport.y as i32);
-    let reach = window as i32 / 2;
-    let sigma = f64::from(frame.smoothing.x);
+/// Fits every pixel of one layer; `depth` and `normal` (packed, unsmoothed) row by row.
+pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], p: &PlaneFit) -> Fit {
+    let (width, height) = (frame.size.x as i32, frame.size.y as i32);
+    let reach = p.window as i32 / 2;
+    let sigma = f64::from(p.sigma);
     let index = |x: i32, y: i32| (y * width + x) as usize;
     let points: Vec<DVec3> = (0..height)
         .flat_map(|y| (0..width).map(move |x| (x, y)))
@@ -84,7 +87,7 @@ pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], window: u32, weig
                         continue;
                     }
                     let apart = points[j] - points[i];
-                    let square = match weighting {
+                    let square = match p.weighting {
                         Weighting::ViewDependent => apart.z * apart.z,
                         Weighting::Euclidean => apart.length_squared(),
                     };
@@ -99,7 +102,7 @@ pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], window: u32, weig
             let v = view_ray(frame, x, y).normalize();
             let z = d * v.z / n.dot(v); // eq. (5)
             let plane = Plane { agreement: normal_sum.length() / total, facing: n.dot(v).abs(), depth: -z };
-            fit.outcome[i] = judge(frame, depth[i], &plane);
+            fit.outcome[i] = judge(frame, p, depth[i], &plane);
             fit.plane[i] = Some(plane);
             if fit.outcome[i] == Outcome::Fitted {
                 fit.depth[i] = plane.depth as f32;
@@ -109,14 +112,14 @@ pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], window: u32, weig
     fit
 }
 
-/// Whether eq. (5) can be trusted; methods.md §3 lists where it fails.
-fn judge(frame: &Frame, own: f32, plane: &Plane) -> Outcome {
+/// Whether eq. (5) can be trusted; docs/methods.md says where it fails.
+fn judge(frame: &Frame, p: &PlaneFit, own: f32, plane: &Plane) -> Outcome {
     let update = (plane.depth - f64::from(own)).abs();
     if plane.agreement < LEAST_AGREEMENT {
         Outcome::ZeroNormal
-    } else if plane.facing < f64::from(frame.smoothing.z) {
+    } else if plane.facing < f64::from(FIT_GRAZING_LIMIT) {
         Outcome::Grazing
-    } else if update.is_nan() || update > f64::from(frame.smoothing.y) || plane.depth < f64::from(frame.viewport.z) {
+    } else if update.is_nan() || update > f64::from(FIT_UPDATE_LIMIT * p.sigma) || plane.depth < f64::from(frame.near) {
         Outcome::Unbounded
     } else {
         Outcome::Fitted
@@ -125,7 +128,6 @@ fn judge(frame: &Frame, own: f32, plane: &Plane) -> Outcome {
 
 /// Direction v = (vx, vy, -1) of the view ray through a pixel's centre: its point at depth d is v d.
 pub fn view_ray(frame: &Frame, x: i32, y: i32) -> DVec3 {
-    let to_pixel = frame.to_pixel.as_dvec4();
     let center = DVec2::new(f64::from(x), f64::from(y)) + 0.5;
-    ((center - DVec2::new(to_pixel.z, to_pixel.w)) / DVec2::new(to_pixel.x, to_pixel.y)).extend(-1.0)
+    ((center - frame.pixel_origin.as_dvec2()) / frame.pixel_scale.as_dvec2()).extend(-1.0)
 }

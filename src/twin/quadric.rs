@@ -37,13 +37,12 @@ pub fn pixel_ray(frame: &Frame, x: u32, y: u32) -> DVec3 {
 
 /// Pixels per unit of x/d along each axis (signed), and the pixel where x/d = 0.
 pub fn scale_offset(frame: &Frame) -> (DVec2, DVec2) {
-    let t = frame.to_pixel.as_dvec4();
-    (t.truncate().truncate(), DVec2::new(t.z, t.w))
+    (frame.pixel_scale.as_dvec2(), frame.pixel_origin.as_dvec2())
 }
 
 /// Width and height in pixels, and the near plane.
 pub fn viewport(frame: &Frame) -> (u32, u32, f64) {
-    (frame.viewport.x as u32, frame.viewport.y as u32, f64::from(frame.viewport.z))
+    (frame.size.x as u32, frame.size.y as u32, f64::from(frame.near))
 }
 
 /// Inverse of the lower triangular L with L Lᵀ = S (Cholesky).

@@ -4,18 +4,19 @@
 use super::{
     background::env_color,
     optics::{fresnel, reflect, refract},
+    quadric::pixel_ray,
     search::{Maps, Ray},
 };
 use crate::{
     Equirect, Fresnel,
     optics::walk::Walk as Rays,
     shader::{
-        CLASS_BODY, CLASS_SPLASH, OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_OTHER_WALL,
+        CLASS_BODY, CLASS_SPLASH, OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_OPPOSITE_WALL,
         OUTCOME_REFLECTION_LIMIT, OUTCOME_SCENE, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH, SIDE_BACK,
-        SIDE_FRONT, WETTED, WETTED_FLAT,
+        SIDE_FRONT, WETTING_FLAT, WETTING_GAP,
     },
 };
-use glam::{DVec3, Mat3, Vec3, Vec4Swizzles};
+use glam::{DVec3, Mat3, Vec3};
 
 /// What the walk of one pixel met.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,10 +48,9 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
     let frame = maps.frame;
     let to_world = Mat3::from_mat4(frame.view).as_dmat3().transpose();
     let background = |x: DVec3, dir: DVec3| maps.background(environment, x, dir);
-    let ior = frame.search.w;
+    let ior = frame.ior;
     let exact = settings.fresnel == Fresnel::Exact;
-    let [ax, ay, bx, by] = frame.to_pixel.to_array().map(f64::from);
-    let v = DVec3::new((pixel[0] as f64 + 0.5 - bx) / ax, (pixel[1] as f64 + 0.5 - by) / ay, -1.0);
+    let v = pixel_ray(frame, pixel[0] as u32, pixel[1] as u32);
     let mut dir = v.normalize();
 
     let splash = maps.depth(CLASS_SPLASH, SIDE_FRONT, pixel);
@@ -58,7 +58,7 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
     // Around the eye: the body if the host says so and there is a body at this pixel, or a particle across the near
     // plane (negative depth). The ray then starts inside, unbent, at the near plane.
     let single = settings.refractions == 1;
-    let said = frame.scene.w != 0.0 && (single || maps.depth(CLASS_BODY, SIDE_BACK, pixel) > 0.0);
+    let said = frame.eye_inside != 0.0 && (single || maps.depth(CLASS_BODY, SIDE_BACK, pixel) > 0.0);
     let around = match (said || body < 0.0, splash < 0.0) {
         (true, _) => Some(CLASS_BODY),
         (false, true) => Some(CLASS_SPLASH),
@@ -66,7 +66,7 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
     };
     // Step 1: the nearer of the two fronts.
     let start = match around {
-        Some(class) => Some((class, f64::from(frame.viewport.z))),
+        Some(class) => Some((class, f64::from(frame.near))),
         None if splash > 0.0 && (body <= 0.0 || splash <= body) => Some((CLASS_SPLASH, splash)),
         None if body > 0.0 => Some((CLASS_BODY, body)),
         None => None,
@@ -83,7 +83,7 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
 
     let (mut x, mut class, mut second) = (depth * v, first, None);
     let (mut color, mut light) = (Vec3::ZERO, Vec3::ONE);
-    let (mut hits, mut length, mut bounces, mut other_wall) = (0, 0.0, 0, false);
+    let (mut hits, mut length, mut bounces, mut opposite_wall) = (0, 0.0, 0, false);
     let (mut outcome, mut on_scene) = (OUTCOME_HIT, None);
     let volumes = if single { 1 } else { settings.refractions / 2 };
     'walk: for volume in 0..volumes {
@@ -95,9 +95,9 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
             };
             let n = if dir.dot(n) > 0.0 { -n } else { n };
             let bent = bend(dir, n, 1.0 / ior).expect("there is no critical angle into water");
-            let share = fresnel(-dir.dot(n) as f32, -bent.dot(n) as f32, ior, exact);
-            color += light * share * background(x, mirror(dir, n));
-            light *= 1.0 - share;
+            let reflected = fresnel(-dir.dot(n) as f32, -bent.dot(n) as f32, ior, exact);
+            color += light * reflected * background(x, mirror(dir, n));
+            light *= 1.0 - reflected;
             dir = bent;
             hits += 1;
         }
@@ -108,12 +108,12 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
         loop {
             let ray = Ray::new(frame, x, dir);
             let exit = maps.find_exit(&ray, class, came_from);
-            let found = [OUTCOME_HIT, OUTCOME_OTHER_WALL].contains(&exit.outcome);
+            let found = [OUTCOME_HIT, OUTCOME_OPPOSITE_WALL].contains(&exit.outcome);
             // Liquid that ends just before the scene touches it.
             let gap = match found {
                 true => {
                     let n = maps.sample_normal(class, exit.side, maps.project(ray.at(exit.t)));
-                    f64::from(WETTED) / dir.dot(n).abs().max(f64::from(WETTED_FLAT))
+                    f64::from(WETTING_GAP) / dir.dot(n).abs().max(f64::from(WETTING_FLAT))
                 }
                 false => 0.0,
             };
@@ -122,14 +122,14 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
             x += t * dir;
             length += t;
             // Eq. (9), for this interval.
-            light *= (-frame.absorption.xyz() * t as f32).exp();
+            light *= (-frame.absorption * t as f32).exp();
             if let Some((_, pixel)) = met {
                 on_scene = Some(pixel);
                 break 'walk;
             }
             match exit.outcome {
                 OUTCOME_HIT => {}
-                OUTCOME_OTHER_WALL => other_wall = true,
+                OUTCOME_OPPOSITE_WALL => opposite_wall = true,
                 ended => {
                     outcome = ended;
                     break 'walk;
@@ -141,9 +141,9 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
             let mirrored = mirror(dir, n);
             if let Some(bent) = bend(dir, -n, ior) {
                 // Leave, eqs. (7) and (8).
-                let share = fresnel(bent.dot(n) as f32, dir.dot(n) as f32, ior, exact);
-                color += light * share * background(x, mirrored);
-                light *= 1.0 - share;
+                let reflected = fresnel(bent.dot(n) as f32, dir.dot(n) as f32, ior, exact);
+                color += light * reflected * background(x, mirrored);
+                light *= 1.0 - reflected;
                 dir = bent;
                 break;
             }
@@ -182,6 +182,6 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
         outcome = OUTCOME_SCENE;
     }
     let pattern = second.map_or(PATTERN_SPLASH + first, |second| PATTERN_SPLASH_SPLASH + 2 * first + second);
-    let outcome = if outcome == OUTCOME_HIT && other_wall { OUTCOME_OTHER_WALL } else { outcome };
+    let outcome = if outcome == OUTCOME_HIT && opposite_wall { OUTCOME_OPPOSITE_WALL } else { outcome };
     Walk { pattern, outcome, hits, length, direction: to_world * dir, color }
 }

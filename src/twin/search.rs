@@ -1,10 +1,11 @@
-//! Twin of `glsl/include/search.glsl`: walls along a ray x(t) = x0 + t w in the four maps (methods: "Walk of one view
-//! ray"). In place of the secant method, a dense march: slow, but the first wall is the first wall.
+//! Twin of `glsl/include/search.glsl`, `exit.glsl` and `entry.glsl`: walls along a ray x(t) = x0 + t w in the four maps
+//! (docs/methods.md, "Searches along a ray"). In place of the secant method, a dense march: slow, but the first wall it
+//! meets is the first wall there is.
 
 use super::{background::Scene, normal::decode_normal};
 use crate::shader::{
-    CLASS_BODY, CLASS_SPLASH, Frame, OUTCOME_HIT, OUTCOME_HOLE, OUTCOME_LEFT_VIEW, OUTCOME_OTHER_WALL, SIDE_BACK,
-    SIDE_FRONT,
+    ACCEPTED, ACCEPTED_PIXELS, CLASS_BODY, CLASS_SPLASH, CONVERGED, CONVERGED_DEPTH, Frame, JUMP, OUTCOME_HIT,
+    OUTCOME_HOLE, OUTCOME_LEFT_VIEW, OUTCOME_OPPOSITE_WALL, SIDE_BACK, SIDE_FRONT, STEEP,
 };
 use glam::{DVec2, DVec3, Mat3, Vec4Swizzles};
 
@@ -29,6 +30,31 @@ pub struct Maps<'a> {
     pub scene: Option<Scene<'a>>,
 }
 
+/// How exactly walls have to be met, from the box around what is drawn. In float32, as the shader has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// |f| of a root.
+    pub converged: f32,
+    /// |f| of a hit, at most.
+    pub accepted: f32,
+    /// Depths of a footprint that differ by more are a jump.
+    pub jump: f32,
+}
+
+impl Tolerance {
+    /// Of a frame.
+    pub fn of(frame: &Frame) -> Tolerance {
+        let (low, high) = (frame.bounds_min, frame.bounds_max);
+        let middle = frame.view.transform_point3(0.5 * (low + high)).length();
+        let farthest = middle + 0.5 * (high - low).length();
+        let converged = CONVERGED.max(CONVERGED_DEPTH * farthest);
+        // What a pixel covers in the middle of the liquid.
+        let pixel = middle / frame.pixel_scale.abs().max_element();
+        let accepted = ACCEPTED.max(ACCEPTED_PIXELS * pixel).max(converged);
+        Tolerance { converged, accepted, jump: JUMP.max(STEEP * pixel) }
+    }
+}
+
 /// Samples of the march: pixels, and depth in particle radii, that one step may cover.
 const STEP_PIXELS: f64 = 0.125;
 const STEP_DEPTH: f64 = 0.125;
@@ -47,26 +73,26 @@ pub struct Exit {
 impl Maps<'_> {
     /// Depth stored at a pixel; 0 where there is no such map.
     pub fn depth(&self, class: u32, side: u32, pixel: [usize; 2]) -> f64 {
-        let width = self.frame.viewport.x as usize;
+        let width = self.frame.size.x as usize;
         let map = self.maps[class as usize][side as usize].depth;
         map.get(pixel[1] * width + pixel[0]).map_or(0.0, |d| f64::from(*d))
     }
 
     /// Normal stored at a pixel.
     pub fn normal(&self, class: u32, side: u32, pixel: [usize; 2]) -> DVec3 {
-        let width = self.frame.viewport.x as usize;
+        let width = self.frame.size.x as usize;
         decode_normal(self.maps[class as usize][side as usize].normal[pixel[1] * width + pixel[0]]).as_dvec3()
     }
 
     /// Pixel position on which an eye-space point with d > 0 lies; pixel centres at +0.5.
     pub fn project(&self, x: DVec3) -> DVec2 {
-        let [ax, ay, bx, by] = self.frame.to_pixel.to_array().map(f64::from);
-        DVec2::new(ax * x.x / -x.z + bx, ay * x.y / -x.z + by)
+        let (scale, origin) = (self.frame.pixel_scale.as_dvec2(), self.frame.pixel_origin.as_dvec2());
+        scale * x.truncate() / -x.z + origin
     }
 
     /// The pixel that holds a position, clamped into the image.
     pub(super) fn clamped(&self, position: DVec2) -> [usize; 2] {
-        let size = self.frame.viewport.xy().as_dvec2();
+        let size = self.frame.size.as_dvec2();
         let p = position.floor().clamp(DVec2::ZERO, size - 1.0);
         [p.x as usize, p.y as usize]
     }
@@ -86,7 +112,7 @@ impl Maps<'_> {
         let depths = four.map(|(pixel, _)| self.depth(class, side, pixel));
         let low = depths.into_iter().fold(f64::INFINITY, f64::min);
         let high = depths.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        (low > 0.0 && high - low <= f64::from(self.frame.search.z)).then_some(four)
+        (low > 0.0 && high - low <= f64::from(Tolerance::of(self.frame).jump)).then_some(four)
     }
 
     /// Depth at a position: bilinear where the footprint is whole, else the pixel's own; `None` without a surface.
@@ -115,25 +141,27 @@ impl Maps<'_> {
         self.sample_depth(class, side, self.project(x)).map(|depth| -x.z - depth)
     }
 
-    /// Narrows a bracket by halving: f(a) < 0, and at b f is positive or there is no map. Then |f| is small at its
-    /// ends, or at the lower one where the map breaks off right behind the wall, or at neither: no wall.
+    /// Narrows a bracket by halving: f(a) < 0, and at b f is positive or the map has a hole. The hit is at whichever end
+    /// |f| is small at last: at both where the map is continuous, at the lower one where it ends right behind the wall,
+    /// at neither where it jumps, and then there is no wall.
     fn bisect(&self, mut a: f64, mut b: f64, f: impl Fn(f64) -> Option<f64>) -> Option<f64> {
         for _ in 0..60 {
             let t = 0.5 * (a + b);
             if f(t).is_none_or(|f| f >= 0.0) { b = t } else { a = t }
         }
-        let accepted = f64::from(self.frame.search.y);
+        let accepted = f64::from(Tolerance::of(self.frame).accepted);
         [b, a].into_iter().find(|t| f(*t).is_some_and(|f| f.abs() <= accepted))
     }
 
     /// Where a ray inside a volume leaves it: the first crossing of the wall ahead, which is the back map for a ray
-    /// that goes away and the front map for one that comes back, or of the other wall, if that lies across its way.
+    /// that goes away from the eye and the front map for one that comes back, or of the opposite wall, if that lies
+    /// across the ray.
     /// `came_from`: the map off which the ray was just reflected; it starts on that one, not inside of it.
     pub fn find_exit(&self, ray: &Ray, class: u32, came_from: Option<u32>) -> Exit {
         let (ahead, sense) = if ray.dir.z <= 0.0 { (SIDE_BACK, 1.0) } else { (SIDE_FRONT, -1.0) };
-        let accepted = f64::from(self.frame.search.y);
-        let own = |t| self.beyond(ray, class, ahead, t).map(|f| sense * f);
-        let other = |t| self.beyond(ray, class, 1 - ahead, t).map(|f| -sense * f);
+        let accepted = f64::from(Tolerance::of(self.frame).accepted);
+        let f_ahead = |t| self.beyond(ray, class, ahead, t).map(|f| sense * f);
+        let f_opposite = |t| self.beyond(ray, class, 1 - ahead, t).map(|f| -sense * f);
         let hit = |found: Option<f64>, last, side, outcome| match found {
             Some(t) => Exit { outcome, t, side },
             None => Exit { outcome: OUTCOME_HOLE, t: last, side },
@@ -142,16 +170,16 @@ impl Maps<'_> {
         let mut inside = came_from != Some(ahead);
         let mut last = 0.0;
         while let Some(t) = self.step(ray, last) {
-            if other(t).is_some_and(|f| f > accepted) {
-                // Where the other map has no surface, it is not in the way.
-                let across = self.bisect(last, t, |t| Some(other(t).unwrap_or(-1.0)));
-                return hit(across, last, 1 - ahead, OUTCOME_OTHER_WALL);
+            if f_opposite(t).is_some_and(|f| f > accepted) {
+                // Where the opposite map has no surface, no wall of it is met.
+                let across = self.bisect(last, t, |t| Some(f_opposite(t).unwrap_or(-1.0)));
+                return hit(across, last, 1 - ahead, OUTCOME_OPPOSITE_WALL);
             }
-            // A hole counts as outside: the liquid ends on the way to it, if the map says where.
-            if own(t).is_some_and(|f| f < 0.0) {
+            // A hole counts as outside: if the map holds the wall before it, the bracket narrows down to that.
+            if f_ahead(t).is_some_and(|f| f < 0.0) {
                 inside = true;
             } else if inside {
-                return hit(self.bisect(last, t, own), last, ahead, OUTCOME_HIT);
+                return hit(self.bisect(last, t, f_ahead), last, ahead, OUTCOME_HIT);
             } else if self.project(ray.at(t)).distance(start) > 2.0 {
                 // Off a wall, and still not inside of it: there is no inside here.
                 return Exit { outcome: OUTCOME_HOLE, t: 0.0, side: ahead };
@@ -201,7 +229,7 @@ impl Maps<'_> {
         let d = -ray.at(t).z;
         let lateral = ray.dir.truncate() * -ray.origin.z + ray.origin.truncate() * ray.dir.z;
         // |d pixel / dt| = |a lateral| / d²
-        let speed = (lateral * self.frame.to_pixel.xy().as_dvec2()).length() / (d * d);
+        let speed = (lateral * self.frame.pixel_scale.as_dvec2()).length() / (d * d);
         ray.box_end.min(t + STEP_PIXELS / speed.max(1e-12))
     }
 
@@ -212,14 +240,14 @@ impl Maps<'_> {
     }
 
     pub(super) fn in_view(&self, x: DVec3) -> bool {
-        let size = self.frame.viewport.xy().as_dvec2();
+        let size = self.frame.size.as_dvec2();
         let p = self.project(x);
-        -x.z >= f64::from(self.frame.viewport.z) && p.cmpge(DVec2::ZERO).all() && p.cmplt(size).all()
+        -x.z >= f64::from(self.frame.near) && p.cmpge(DVec2::ZERO).all() && p.cmplt(size).all()
     }
 
     /// Whether what ended a march at t was the border of the view.
     fn leaves_view(&self, ray: &Ray, t: f64) -> bool {
-        t < ray.box_end && -ray.at(self.next(ray, t)).z >= f64::from(self.frame.viewport.z)
+        t < ray.box_end && -ray.at(self.next(ray, t)).z >= f64::from(self.frame.near)
     }
 }
 
@@ -240,7 +268,7 @@ impl Ray {
         let to_world = Mat3::from_mat4(frame.view).as_dmat3().transpose();
         let o = to_world * (origin - frame.view.w_axis.xyz().as_dvec3());
         let w = to_world * dir;
-        let (low, high) = (frame.bounds_min.xyz().as_dvec3(), frame.bounds_max.xyz().as_dvec3());
+        let (low, high) = (frame.bounds_min.as_dvec3(), frame.bounds_max.as_dvec3());
         let ends = (0..3).filter(|k| w[*k] != 0.0).map(|k| (if w[k] > 0.0 { high[k] } else { low[k] } - o[k]) / w[k]);
         Ray { origin, dir, box_end: ends.fold(f64::INFINITY, f64::min).max(0.0) }
     }

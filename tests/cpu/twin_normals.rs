@@ -14,7 +14,7 @@ fn degrees(a: DVec3, b: DVec3) -> f64 {
 
 #[test]
 fn a_tilted_plane_has_its_normal() {
-    let frame = frame(SIZE, 0.3);
+    let frame = frame(SIZE);
     for tilt in (0..=85).step_by(5) {
         let (_, n) = tilted(f64::from(tilt), 37.0 + 50.0 * f64::from(tilt));
         let depth = plane(&frame, n, 1.5, |x, y| x != 20 && y != 30);
@@ -41,9 +41,9 @@ fn a_tilted_plane_has_its_normal() {
 
 #[test]
 fn a_sphere_has_its_normals() {
-    let frame = frame(SIZE, 0.3);
+    let frame = frame(SIZE);
     let (center, radius) = (DVec3::new(0.1, -0.05, -2.0), 0.6);
-    let pixel = 2.0 / f64::from(frame.to_pixel.x);
+    let pixel = 2.0 / f64::from(frame.pixel_scale.x);
     for side in [SIDE_FRONT, SIDE_BACK] {
         let mut depth = Vec::new();
         for (y, x) in (0..SIZE[1] as i32).flat_map(|y| (0..SIZE[0] as i32).map(move |x| (y, x))) {
@@ -74,7 +74,7 @@ fn a_sphere_has_its_normals() {
 #[test]
 fn a_jump_is_not_differenced() {
     // Two flat halves: at the edge each takes its own side.
-    let frame = frame(SIZE, 0.3);
+    let frame = frame(SIZE);
     let depth: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(|i| if i % SIZE[0] < 30 { 1.0 } else { 1.3 }).collect();
     let result = normals(&frame, &depth, &vec![7; depth.len()], SIDE_FRONT);
     assert!(result.normal.iter().all(|n| *n == encode_normal(Vec3::Z)));
@@ -83,7 +83,7 @@ fn a_jump_is_not_differenced() {
 
 #[test]
 fn lone_pixels_and_lines_keep_the_ray_cast_normal() {
-    let frame = frame(SIZE, 0.3);
+    let frame = frame(SIZE);
     let at = |x: usize, y: usize| y * SIZE[0] as usize + x;
     let mut depth = vec![0.0; (SIZE[0] * SIZE[1]) as usize];
     let raw: Vec<u32> = (1..=depth.len() as u32).collect();

@@ -1,20 +1,26 @@
 //! Plane fitting (Imai16 §4.3) against what its formulas promise, on maps with closed forms.
 
 use glam::{DVec3, Vec3};
+use meniscus::inspect::uniforms;
 use meniscus::shader::Frame;
+use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
 use meniscus::space::Space;
 use meniscus::twin::normal::{decode_normal, encode_normal};
 use meniscus::twin::plane_fit::{Fit, Outcome, plane_fit, view_ray};
-use meniscus::{Camera, Settings, Weighting};
+use meniscus::{Camera, Settings};
 
 const SIZE: [u32; 2] = [61, 47];
 
-/// Uniforms of a camera 40 degrees high, in a space of radius 1; `sigma` in that too.
-pub fn frame(size: [u32; 2], sigma: f32) -> Frame {
+fn fit_of(sigma: f32, window: u32, weighting: Weighting) -> PlaneFit {
+    PlaneFit::default().sigma(sigma).window(window).weighting(weighting)
+}
+
+/// Uniforms of a camera 40 degrees high, in a space of radius 1.
+pub fn frame(size: [u32; 2]) -> Frame {
     let camera =
         Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40f32.to_radians(), size[0] as f32 / size[1] as f32, 0.01);
     let space = Space::new(1.0, Vec3::ZERO);
-    camera.uniforms(&Settings { sigma, ..Settings::default() }, size, &space, (Vec3::ZERO, Vec3::ONE))
+    uniforms(&camera, &Settings::default(), size, &space, (Vec3::ZERO, Vec3::ONE))
 }
 
 /// A plane's normal as a code and as what the code says: of the two only the latter is exact.
@@ -28,7 +34,7 @@ pub fn tilted(tilt_degrees: f64, azimuth_degrees: f64) -> (u32, DVec3) {
 /// Depth map of the plane with this normal through (0, 0, -`depth`), where `keep` says so and the ray meets it well
 /// before the horizon.
 pub fn plane(frame: &Frame, n: DVec3, depth: f64, keep: impl Fn(i32, i32) -> bool) -> Vec<f32> {
-    let (w, h) = (frame.viewport.x as i32, frame.viewport.y as i32);
+    let (w, h) = (frame.size.x as i32, frame.size.y as i32);
     let mut map = Vec::new();
     for y in 0..h {
         for x in 0..w {
@@ -43,7 +49,7 @@ pub fn plane(frame: &Frame, n: DVec3, depth: f64, keep: impl Fn(i32, i32) -> boo
 }
 
 fn flat(frame: &Frame, depth: f32) -> (Vec<f32>, Vec<u32>) {
-    let count = (frame.viewport.x * frame.viewport.y) as usize;
+    let count = (frame.size.x * frame.size.y) as usize;
     (vec![depth; count], vec![encode_normal(Vec3::Z); count])
 }
 
@@ -51,8 +57,8 @@ fn at(x: i32, y: i32) -> usize {
     (y * SIZE[0] as i32 + x) as usize
 }
 
-fn run(frame: &Frame, depth: &[f32], normal: &[u32]) -> Fit {
-    plane_fit(frame, depth, normal, 9, Weighting::ViewDependent)
+fn run(sigma: f32, frame: &Frame, depth: &[f32], normal: &[u32]) -> Fit {
+    plane_fit(frame, depth, normal, &fit_of(sigma, 9, Weighting::ViewDependent))
 }
 
 /// A plane is a fixed point at any tilt, at its silhouette and at the image's border too, where an average of depths
@@ -63,10 +69,10 @@ fn a_plane_stays_where_it_is() {
     for weighting in [Weighting::ViewDependent, Weighting::Euclidean] {
         for (tilt, azimuth) in [(0, 0), (15, 70), (30, 200), (45, 33), (60, 120), (75, 250), (85, 300), (89, 95)] {
             for masked in [false, true] {
-                let frame = frame(SIZE, 0.3);
+                let frame = frame(SIZE);
                 let (code, n) = tilted(f64::from(tilt), f64::from(azimuth));
                 let depth = plane(&frame, n, 1.5, |x, y| !masked || disc(x, y));
-                let fit = plane_fit(&frame, &depth, &vec![code; depth.len()], 9, weighting);
+                let fit = plane_fit(&frame, &depth, &vec![code; depth.len()], &fit_of(0.3, 9, weighting));
                 let (mut fitted, mut averaged) = (0, 0.0f64);
                 for y in 0..SIZE[1] as i32 {
                     for x in 0..SIZE[0] as i32 {
@@ -102,13 +108,13 @@ fn a_plane_stays_where_it_is() {
 /// A gap of several sigma weighs e^-36: nothing crosses it.
 #[test]
 fn a_step_is_kept() {
-    let frame = frame(SIZE, 0.1);
+    let frame = frame(SIZE);
     let (mut depth, normal) = flat(&frame, 1.0);
     depth.iter_mut().enumerate().filter(|(i, _)| i % SIZE[0] as usize >= 30).for_each(|(_, d)| *d = 1.6);
-    assert_eq!(run(&frame, &depth, &normal).depth, depth);
+    assert_eq!(run(0.1, &frame, &depth, &normal).depth, depth);
     // While one of half a sigma is smoothed.
     depth.iter_mut().filter(|d| **d > 1.0).for_each(|d| *d = 1.05);
-    let fit = run(&frame, &depth, &normal);
+    let fit = run(0.1, &frame, &depth, &normal);
     assert!(fit.depth[at(29, 20)] > 1.015 && fit.depth[at(30, 20)] < 1.035);
     assert_eq!(fit.depth[at(20, 20)], 1.0);
 }
@@ -117,9 +123,9 @@ fn a_step_is_kept() {
 /// across a gap gains; differences of depth do not.
 #[test]
 fn euclidean_weights_smooth_a_gap_that_depth_differences_keep() {
-    let frame = frame(SIZE, 1.0);
+    let frame = frame(SIZE);
     // A pixel is sigma wide; the centre is cut off from its own surface by a ring 1.5 sigma behind.
-    let pixel = frame.to_pixel.x;
+    let pixel = frame.pixel_scale.x;
     let (mut depth, normal) = flat(&frame, pixel);
     for y in 19..=21 {
         for x in 29..=31 {
@@ -127,7 +133,7 @@ fn euclidean_weights_smooth_a_gap_that_depth_differences_keep() {
         }
     }
     depth[at(30, 20)] = pixel;
-    let moved = |weighting| plane_fit(&frame, &depth, &normal, 9, weighting).depth[at(30, 20)] - pixel;
+    let moved = |weighting| plane_fit(&frame, &depth, &normal, &fit_of(1.0, 9, weighting)).depth[at(30, 20)] - pixel;
     let (kept, smoothed) = (moved(Weighting::ViewDependent), moved(Weighting::Euclidean));
     // 1.5 * 8 e^-2.25 / (73 + 8 e^-2.25)
     assert!((kept - 0.01714).abs() < 1e-4, "{kept}");
@@ -136,7 +142,7 @@ fn euclidean_weights_smooth_a_gap_that_depth_differences_keep() {
 
 #[test]
 fn a_lone_pixel_keeps_its_depth() {
-    let frame = frame(SIZE, 0.3);
+    let frame = frame(SIZE);
     for (x, y) in [(0, 0), (60, 46), (30, 20)] {
         let mut depth = vec![0.0; (SIZE[0] * SIZE[1]) as usize];
         depth[at(x, y)] = 1.25;
@@ -144,7 +150,7 @@ fn a_lone_pixel_keeps_its_depth() {
         depth[at(if x < 30 { x + 5 } else { x - 5 }, y)] = 3.0;
         depth[at(x, if y < 30 { y + 1 } else { y - 1 })] = -0.5;
         let (code, _) = tilted(40.0, 10.0);
-        let fit = run(&frame, &depth, &vec![code; depth.len()]);
+        let fit = run(0.3, &frame, &depth, &vec![code; depth.len()]);
         assert_eq!(fit.depth, depth);
         assert_eq!(fit.count(Outcome::Fitted), 2);
     }
@@ -152,7 +158,7 @@ fn a_lone_pixel_keeps_its_depth() {
 
 #[test]
 fn the_window_ends_where_it_should() {
-    let frame = frame(SIZE, 10.0);
+    let frame = frame(SIZE);
     let normal = vec![encode_normal(Vec3::Z); (SIZE[0] * SIZE[1]) as usize];
     for window in [3, 9, 17, 19, 25] {
         let reach = window as i32 / 2;
@@ -160,7 +166,7 @@ fn the_window_ends_where_it_should() {
             let mut depth = vec![0.0; normal.len()];
             depth[at(30, 20)] = 1.0;
             depth[at(30 + apart, 20)] = 2.0;
-            let fit = plane_fit(&frame, &depth, &normal, window, Weighting::ViewDependent);
+            let fit = plane_fit(&frame, &depth, &normal, &fit_of(10.0, window, Weighting::ViewDependent));
             // Two weights that are all but equal: the mean.
             let expected = if moves { 1.5 } else { 1.0 };
             assert!((fit.depth[at(30, 20)] - expected).abs() < 0.02, "{window}, {apart}");
@@ -170,14 +176,14 @@ fn the_window_ends_where_it_should() {
 
 #[test]
 fn guards_keep_the_depth_and_are_counted() {
-    let frame = frame(SIZE, 0.3);
+    let frame = frame(SIZE);
     // Normals that cancel.
     let mut depth = vec![0.0; (SIZE[0] * SIZE[1]) as usize];
     let mut normal = vec![0; depth.len()];
     let (code, n) = tilted(30.0, 0.0);
     (depth[at(30, 20)], normal[at(30, 20)]) = (1.0, code);
     (depth[at(31, 20)], normal[at(31, 20)]) = (1.0, encode_normal(-n.as_vec3()));
-    let fit = run(&frame, &depth, &normal);
+    let fit = run(0.3, &frame, &depth, &normal);
     assert_eq!((fit.depth, fit.outcome[at(30, 20)]), (depth.clone(), Outcome::ZeroNormal));
     assert_eq!(fit.outcome.iter().filter(|o| **o == Outcome::ZeroNormal).count(), 2);
 
@@ -188,7 +194,7 @@ fn guards_keep_the_depth_and_are_counted() {
         let across = v.cross(DVec3::Y).normalize();
         let n = facing * -v + (1.0 - facing * facing).sqrt() * across;
         depth[at(30, 20)] = 1.0;
-        let fit = run(&frame, &depth, &vec![encode_normal(n.as_vec3()); depth.len()]);
+        let fit = run(0.3, &frame, &depth, &vec![encode_normal(n.as_vec3()); depth.len()]);
         assert_eq!((fit.depth[at(30, 20)], fit.outcome[at(30, 20)]), (1.0, expected));
         assert_eq!(fit.count(Outcome::Grazing), u32::from(expected == Outcome::Grazing));
     }
@@ -200,18 +206,17 @@ fn guards_keep_the_depth_and_are_counted() {
     let mut depth = vec![0.0; normal.len()];
     (depth[at(30, 20)], depth[at(31, 20)]) = (1.0, 1.0);
     let codes = vec![code; depth.len()];
-    let tight = self::frame(SIZE, 0.01);
-    let fit = run(&tight, &depth, &codes);
+    let fit = run(0.01, &frame, &depth, &codes);
     assert_eq!((fit.count(Outcome::Unbounded), &fit.depth), (2, &depth));
     let mut far = frame;
-    far.viewport.z = 0.999;
-    let fit = run(&far, &depth, &codes);
+    far.near = 0.999;
+    let fit = run(0.3, &far, &depth, &codes);
     assert_eq!((fit.count(Outcome::Unbounded), fit.count(Outcome::Fitted)), (1, 1));
 }
 
 #[test]
 fn noise_is_reduced() {
-    let frame = frame(SIZE, 0.3);
+    let frame = frame(SIZE);
     let (code, n) = tilted(40.0, 60.0);
     let truth = plane(&frame, n, 1.5, |_, _| true);
     let mut state = 1u64;
@@ -229,7 +234,7 @@ fn noise_is_reduced() {
     let mut last = spread(&map);
     let first = last;
     for _ in 0..3 {
-        map = run(&frame, &map, &vec![code; map.len()]).depth;
+        map = run(0.3, &frame, &map, &vec![code; map.len()]).depth;
         assert!(spread(&map) < last, "{} after {last}", spread(&map));
         last = spread(&map);
     }

@@ -1,8 +1,10 @@
 //! The twin of the refraction pass on maps made here: spheres ray-cast in the test, against closed forms.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use meniscus::{
     Camera, Equirect, Settings,
+    inspect::{Walk as Rays, uniforms},
+    optics::Optics,
     shader::{
         Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_REFLECTION_LIMIT, PATTERN_BODY_SPLASH, PATTERN_NONE,
         PATTERN_SPLASH,
@@ -25,13 +27,12 @@ const RADIUS: f64 = 0.3;
 fn frame(settings: &Settings, bounds: (Vec3, Vec3)) -> Frame {
     let aspect = SIZE[0] as f32 / SIZE[1] as f32;
     let camera = Camera::look_at(Vec3::ZERO, -Vec3::Z, Vec3::Y, 40f32.to_radians(), aspect, 0.01);
-    camera.uniforms(settings, SIZE, &Space::new(RADIUS as f32, Vec3::ZERO), bounds)
+    uniforms(&camera, settings, SIZE, &Space::new(RADIUS as f32, Vec3::ZERO), bounds)
 }
 
 fn view_ray(frame: &Frame, pixel: usize) -> DVec3 {
-    let [ax, ay, bx, by] = frame.to_pixel.to_array().map(f64::from);
-    let (x, y) = (pixel % SIZE[0] as usize, pixel / SIZE[0] as usize);
-    DVec3::new((x as f64 + 0.5 - bx) / ax, (y as f64 + 0.5 - by) / ay, -1.0)
+    let pixel = DVec2::new((pixel % SIZE[0] as usize) as f64, (pixel / SIZE[0] as usize) as f64) + 0.5;
+    ((pixel - frame.pixel_origin.as_dvec2()) / frame.pixel_scale.as_dvec2()).extend(-1.0)
 }
 
 /// Both crossings of a ray with a sphere.
@@ -82,7 +83,15 @@ fn degrees(a: DVec3, b: DVec3) -> f64 {
     a.cross(b).length().atan2(a.dot(b)).to_degrees()
 }
 
-fn walk_all(maps: &Maps, settings: &Settings, sky: &Equirect) -> Vec<Walk> {
+/// Two refractions, or four, with so many reflections inside; and what the walk is told of them.
+fn optics(name: &str, reflections: u32) -> (Settings, Rays) {
+    let mut settings = Settings::default();
+    settings.method.optics = Optics::named(name).expect("optics");
+    settings.set("internal_reflections", &reflections.to_string()).expect("a parameter");
+    (settings, Rays::of(&settings.method.optics).expect("they walk"))
+}
+
+fn walk_all(maps: &Maps, settings: &Rays, sky: &Equirect) -> Vec<Walk> {
     let width = SIZE[0] as usize;
     let world = |w: Walk| Walk { length: w.length * RADIUS, ..w };
     (0..width * SIZE[1] as usize).map(|i| world(walk(maps, settings, sky, [i % width, i / width]))).collect()
@@ -94,13 +103,13 @@ fn grey() -> Equirect {
 
 #[test]
 fn a_ball_is_left_as_the_closed_form_says() {
-    let settings = Settings { refractions: 2, ..Settings::default() };
+    let (settings, rays) = optics("two", 4);
     let (center, radius) = (DVec3::new(0.1, -0.05, -1.2), 0.3);
     let frame = frame(&settings, (Vec3::new(-0.2, -0.35, -1.5), Vec3::new(0.4, 0.25, -0.9)));
     let layers = sphere_maps(&frame, center, radius);
     let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]], scene: None };
     let mut compared = 0;
-    for (i, found) in walk_all(&maps, &settings, &grey()).iter().enumerate() {
+    for (i, found) in walk_all(&maps, &rays, &grey()).iter().enumerate() {
         let dir = view_ray(&frame, i).normalize();
         let Some((_, exit, length)) = through(DVec3::ZERO, dir, center, radius) else {
             assert_eq!((found.pattern, found.outcome), (PATTERN_NONE, OUTCOME_NO_LIQUID));
@@ -124,12 +133,13 @@ fn a_ball_is_left_as_the_closed_form_says() {
 #[test]
 fn absorption_follows_the_length_inside() {
     let absorption = Vec3::new(0.5, 1.0, 4.0);
-    let settings = Settings { refractions: 2, absorption, ..Settings::default() };
+    let (mut settings, rays) = optics("two", 4);
+    settings.liquid.absorption = absorption;
     let (center, radius) = (DVec3::new(0.0, 0.0, -1.2), 0.3);
     let frame = frame(&settings, (Vec3::new(-0.3, -0.3, -1.5), Vec3::new(0.3, 0.3, -0.9)));
     let layers = sphere_maps(&frame, center, radius);
     let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]], scene: None };
-    let found = walk(&maps, &settings, &grey(), [SIZE[0] as usize / 2, SIZE[1] as usize / 2]);
+    let found = walk(&maps, &rays, &grey(), [SIZE[0] as usize / 2, SIZE[1] as usize / 2]);
     // Straight through the middle: 0.6 inside; what is reflected before was not absorbed.
     let f = ((IOR - 1.0) / (IOR + 1.0)).powi(2) as f32;
     let expected = 0.5 * (f + (1.0 - f) * (-0.6 * absorption).exp());
@@ -138,13 +148,13 @@ fn absorption_follows_the_length_inside() {
 
 #[test]
 fn two_balls_in_a_row_bend_light_four_times() {
-    let settings = Settings::default();
+    let (settings, rays) = optics("four", 4);
     let frame = frame(&settings, (Vec3::new(-0.5, -0.5, -3.0), Vec3::new(0.5, 0.5, -0.9)));
     let (near, far) = ((DVec3::new(0.05, 0.02, -1.15), 0.2), (DVec3::new(0.0, 0.0, -2.3), 0.5));
     let (body, splash) = (sphere_maps(&frame, near.0, near.1), sphere_maps(&frame, far.0, far.1));
     let maps = Maps { frame: &frame, maps: [as_maps(&splash), as_maps(&body)], scene: None };
     let mut compared = 0;
-    for (i, found) in walk_all(&maps, &settings, &grey()).iter().enumerate() {
+    for (i, found) in walk_all(&maps, &rays, &grey()).iter().enumerate() {
         let dir = view_ray(&frame, i).normalize();
         if near.0.cross(dir).length() > 0.6 * near.1 {
             continue;
@@ -163,7 +173,7 @@ fn two_balls_in_a_row_bend_light_four_times() {
 
 #[test]
 fn an_eye_in_a_ball_meets_the_critical_angle() {
-    let settings = Settings { refractions: 2, internal_reflections: 0, ..Settings::default() };
+    let (settings, rays) = optics("two", 0);
     let (center, radius) = (DVec3::new(0.8, 0.0, 0.0), 1.0);
     let frame = frame(&settings, (Vec3::new(-0.2, -1.0, -1.0), Vec3::new(1.8, 1.0, 1.0)));
     let mut layers = sphere_maps(&frame, center, radius);
@@ -171,7 +181,7 @@ fn an_eye_in_a_ball_meets_the_critical_angle() {
     layers[0].0.fill((-0.01 / RADIUS) as f32);
     let maps = Maps { frame: &frame, maps: [as_maps(&layers), [Map::default(); 2]], scene: None };
     let mut counts = [0, 0];
-    for (i, found) in walk_all(&maps, &settings, &grey()).iter().enumerate() {
+    for (i, found) in walk_all(&maps, &rays, &grey()).iter().enumerate() {
         let v = view_ray(&frame, i);
         let (start, dir) = (0.01 * v, v.normalize());
         let far = crossings(start, dir, center, radius).unwrap().1;

@@ -1,31 +1,30 @@
 //! Barriers: what the passes declare becomes what they need, and validation would say so if it did not.
 
-use crate::support::{camera, each_driver, random_cloud};
+use crate::support::{Choose, camera, each_driver, random_cloud};
 use ash::vk::{self, AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};
 use glam::Vec3;
-use meniscus::access::{Access, State};
 use meniscus::host::{Gpu, HostError, Instance, Session};
-use meniscus::targets::Id;
+use meniscus::inspect::{Access, State};
 use meniscus::{Equirect, FrameInput, Settings};
 
 /// Every target that a pass reads: the pass, the target, the stage that wrote it, the stage that reads it. Of several
 /// passes that read in the same stage only the first needs a barrier.
-const READS: [(&str, Id, S, S); 15] = [
-    ("cull", Id::Bounds, S::COMPUTE_SHADER, S::COMPUTE_SHADER),
-    ("compact", Id::Visible, S::COMPUTE_SHADER, S::COMPUTE_SHADER),
-    ("splash front", Id::Drawn, S::COMPUTE_SHADER, S::VERTEX_SHADER),
-    ("splash front", Id::Draws, S::COMPUTE_SHADER, S::DRAW_INDIRECT),
-    ("plane fit", Id::BodyDepthRaw, S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),
-    ("plane fit", Id::BodyNormalRaw, S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),
-    ("plane fit", Id::BodyDepthA, S::COMPUTE_SHADER, S::COMPUTE_SHADER),
-    ("plane fit", Id::BodyDepthB, S::COMPUTE_SHADER, S::COMPUTE_SHADER),
-    ("normals", Id::BodyDepthA, S::COMPUTE_SHADER, S::COMPUTE_SHADER),
-    ("refract", Id::BodyDepthA, S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
-    ("refract", Id::BodyNormal, S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
-    ("tiles", Id::SplashDepth, S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),
-    ("refract", Id::SplashDepth, S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
-    ("refract", Id::FrontTiles, S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
-    ("refract", Id::SplashNormal, S::COLOR_ATTACHMENT_OUTPUT, S::FRAGMENT_SHADER),
+const READS: [(&str, &str, S, S); 15] = [
+    ("cull", "body depth bounds", S::COMPUTE_SHADER, S::COMPUTE_SHADER),
+    ("compact", "visible particles", S::COMPUTE_SHADER, S::COMPUTE_SHADER),
+    ("splash front", "drawn particles", S::COMPUTE_SHADER, S::VERTEX_SHADER),
+    ("splash front", "indirect draws", S::COMPUTE_SHADER, S::DRAW_INDIRECT),
+    ("plane fit", "body depth (ray-cast)", S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),
+    ("plane fit", "body normal (ray-cast)", S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),
+    ("plane fit", "body depth (smoothed, odd)", S::COMPUTE_SHADER, S::COMPUTE_SHADER),
+    ("plane fit", "body depth (smoothed, even)", S::COMPUTE_SHADER, S::COMPUTE_SHADER),
+    ("normals", "body depth (smoothed, odd)", S::COMPUTE_SHADER, S::COMPUTE_SHADER),
+    ("refract", "body depth (smoothed, odd)", S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
+    ("refract", "body normal (smoothed)", S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
+    ("tiles", "splash depth", S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),
+    ("refract", "splash depth", S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
+    ("refract", "front depth tiles", S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
+    ("refract", "splash normal", S::COLOR_ATTACHMENT_OUTPUT, S::FRAGMENT_SHADER),
 ];
 
 #[test]
@@ -39,8 +38,8 @@ fn a_frame_has_a_barrier_before_every_read() {
         session.renderer.set_particles(&particles).expect("particles");
         let camera = camera(Vec3::new(0.3, 0.4, 2.0), Vec3::ZERO, size);
         // Three iterations: A is read both within the loop and after it.
-        let settings = Settings { iterations: 3, ..Settings::default() };
-        let input = FrameInput { debug: true, ..FrameInput::new(0, &camera, &settings, vk::ImageView::null()) };
+        let settings = Settings::default().iterations(3);
+        let input = FrameInput::new(0, &camera, &settings, vk::ImageView::null());
         let mut plans = Vec::new();
         for _ in 0..4 {
             session.frame(&input).expect("frame");
@@ -56,20 +55,15 @@ fn a_frame_has_a_barrier_before_every_read() {
                     let earlier = plan[..at].iter().rfind(|f| f.resource == e.resource);
                     let flushed = src.1.intersects(WRITES)
                         || src.1.is_empty() && earlier.is_some_and(|f| f.barrier.src.1.intersects(WRITES));
-                    e.pass == pass && e.resource == id.name() && stages && flushed
+                    e.pass == pass && e.resource == id && stages && flushed
                 });
                 let text = plan.iter().map(|e| format!("{e}\n")).collect::<String>();
-                assert!(
-                    found,
-                    "{}: no barrier from {writer:?} before {pass} reads {}:\n{text}",
-                    driver.name,
-                    id.name()
-                );
+                assert!(found, "{}: no barrier from {writer:?} before {pass} reads {}:\n{text}", driver.name, id);
             }
         }
         // Those who read the print see the same.
         let line =
-            printed.iter().find(|l| l.starts_with("refract") && l.contains(Id::BodyNormal.name())).expect("a line");
+            printed.iter().find(|l| l.starts_with("refract") && l.contains("body normal (smoothed)")).expect("a line");
         for part in ["COMPUTE_SHADER", "SHADER_WRITE", "GENERAL", "FRAGMENT_SHADER", "SHADER_READ_ONLY_OPTIMAL"] {
             assert!(line.contains(part), "{line}");
         }

@@ -3,16 +3,15 @@
 
 use crate::{
     refract::degrees,
-    support::{Case, Driver, Shot, each_driver, sphere},
+    support::{Case, Choose, Driver, Shot, each_driver, sphere},
 };
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use meniscus::{
     Camera, Ellipsoid, Particles, Settings,
     shader::{
-        OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_OTHER_WALL, OUTCOME_PAST_JUMP, OUTCOME_REFLECTION_LIMIT, PATTERN_BODY,
-        PATTERN_SPLASH, PATTERN_SPLASH_BODY,
+        OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_OPPOSITE_WALL, OUTCOME_PAST_JUMP, OUTCOME_REFLECTION_LIMIT,
+        PATTERN_BODY, PATTERN_SPLASH, PATTERN_SPLASH_BODY,
     },
-    targets::Id,
     twin::normal::decode_normal,
 };
 
@@ -106,7 +105,7 @@ pub fn case(radius: f32, splash: &[Ellipsoid], body: &[Ellipsoid], camera: Camer
 }
 
 pub fn settings(refractions: u32, internal_reflections: u32) -> Settings {
-    Settings { refractions, internal_reflections, iterations: 0, ..Settings::default() }
+    Settings::default().refractions(refractions).reflections(internal_reflections).iterations(0)
 }
 
 /// One pixel: where its ray starts and runs in the world (from the camera's matrices alone), and what the GPU found.
@@ -123,7 +122,8 @@ pub struct Pixel {
 }
 
 pub fn pixels(case: &Case, shot: &Shot) -> Vec<Pixel> {
-    let (walk, direction) = (shot.floats(Id::Walk, 0).unwrap(), shot.floats(Id::Direction, 0).unwrap());
+    let (walk, direction) =
+        (shot.floats("walk (debug)", 0).unwrap(), shot.floats("final direction (debug)", 0).unwrap());
     let numbers = walk.iter().chain(&direction).chain(shot.picture.as_flattened());
     assert!(numbers.into_iter().all(|v| v.is_finite()), "not finite");
     let to_world = case.camera.view.as_dmat4().inverse();
@@ -158,7 +158,7 @@ pub fn within(what: &str, driver: &Driver, mut errors: Vec<f64>, at_least: usize
 }
 
 fn found_all(outcome: u32) -> bool {
-    [OUTCOME_HIT, OUTCOME_PAST_JUMP, OUTCOME_OTHER_WALL].contains(&outcome)
+    [OUTCOME_HIT, OUTCOME_PAST_JUMP, OUTCOME_OPPOSITE_WALL].contains(&outcome)
 }
 
 /// Silhouette, exit direction (two refractions) and path length of a ball, in the middle of the view and off its axis.
@@ -233,13 +233,13 @@ fn tilted_planes_keep_depth_and_normal() {
     for tilt in [0.0f32, 30.0, 60.0, 75.0, 85.0, 89.0] {
         let axes = Mat3::from_rotation_x(-tilt.to_radians()) * Mat3::from_diagonal(Vec3::new(3.0, 3.0, 0.04));
         let body = Ellipsoid { center: Vec3::ZERO, axes };
-        let optics = Settings { refractions: 1, ..Settings::default() };
+        let optics = Settings::default().refractions(1);
         let case = case(0.05, &[], &[body], view(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, 8.0), optics);
         let q = Quadric::new(&body);
         each_driver(|driver| {
             let shot = driver.shoot(&case);
-            let depths = [Id::BodyDepthRaw, Id::BodyDepthB].map(|id| shot.depths(id, 0).unwrap());
-            let normals = [Id::BodyNormalRaw, Id::BodyNormal].map(|id| shot.words(id, 0).unwrap());
+            let depths = ["body depth (ray-cast)", "body depth (smoothed, even)"].map(|id| shot.depths(id, 0).unwrap());
+            let normals = ["body normal (ray-cast)", "body normal (smoothed)"].map(|id| shot.words(id, 0).unwrap());
             let rotation = Mat3::from_mat4(case.camera.view).as_dmat3().transpose();
             let (mut off, mut turned, mut bent) = ([vec![], vec![]], [vec![], vec![]], Vec::new());
             for p in pixels(&case, &shot) {
@@ -307,7 +307,7 @@ fn a_ball_before_a_slab_is_left_by_its_own_back() {
 fn a_ball_on_an_edge_is_not_smoothed() {
     let ball = sphere(Vec3::new(0.5, 0.0, 0.3), 0.15);
     let body = Ellipsoid { center: Vec3::ZERO, axes: Mat3::from_diagonal(Vec3::new(0.5, 0.6, 0.2)) };
-    let smooth = Settings { iterations: 5, ..Settings::default() };
+    let smooth = Settings::default().iterations(5);
     let camera = view(Vec3::new(0.2, 0.3, 2.5), Vec3::ZERO, 45.0);
     let cases: [(&[_], &[_]); 3] = [(&[ball], &[body]), (&[ball], &[]), (&[], &[body])];
     let cases = cases.map(|(splash, body)| case(0.15, splash, body, camera, smooth));
@@ -315,15 +315,15 @@ fn a_ball_on_an_edge_is_not_smoothed() {
         let [both, ball, body] = cases.each_ref().map(|case| driver.shoot(case));
         for layer in 0..2 {
             // Without the body the ball itself is the origin: its last bits are others.
-            let of = |shot: &Shot| shot.floats(Id::SplashDepth, layer).unwrap();
+            let of = |shot: &Shot| shot.floats("splash depth", layer).unwrap();
             let off = |(a, b): &(f32, f32)| (a - b).abs() > 2e-4;
             let off = of(&both).into_iter().zip(of(&ball)).filter(off).count();
             assert!(off <= 2, "{}: {off} pixels of the ball moved", driver.name);
-            for id in [Id::BodyDepthA, Id::BodyNormal] {
+            for id in ["body depth (smoothed, odd)", "body normal (smoothed)"] {
                 assert!(both.words(id, layer) == body.words(id, layer), "{}: {id:?} {layer}", driver.name);
             }
         }
-        let drawn = |shot: &Shot| shot.floats(Id::SplashDepth, 0).unwrap().iter().filter(|d| **d > 0.0).count();
+        let drawn = |shot: &Shot| shot.floats("splash depth", 0).unwrap().iter().filter(|d| **d > 0.0).count();
         assert!(drawn(&both) > 800, "{}: {}", driver.name, drawn(&both));
     });
 }

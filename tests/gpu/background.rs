@@ -5,15 +5,14 @@ use crate::{
     analytic::{Quadric, SIZE, case, pixels, settings, snell, view, within},
     host::{self, with_renderer},
     refract::degrees,
-    support::{Driver, each_driver, random_cloud, sphere},
+    support::{Choose, Driver, each_driver, random_cloud, sphere},
 };
 use ash::vk;
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{
     Background, Camera, Ellipsoid, EnvironmentInput, EnvironmentShape, Equirect, FrameInput, SceneInput, Settings,
     host::{Canvas, Gpu},
-    shader::{OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_SCENE, WETTED},
-    targets::Id,
+    shader::{OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_SCENE, WETTING_GAP},
     twin::{background::env_color, optics::fresnel},
 };
 
@@ -45,13 +44,7 @@ impl<'a> HostScene<'a> {
     }
 
     pub fn input(&self) -> SceneInput {
-        SceneInput {
-            color: self.color.view,
-            color_layout: READ,
-            depth: self.depth.view,
-            depth_layout: READ,
-            cleared_depth: CLEARED,
-        }
+        SceneInput::new((self.color.view, READ), (self.depth.view, READ), CLEARED)
     }
 }
 
@@ -88,7 +81,7 @@ fn a_plane_in_and_behind_a_slab_is_met_where_the_closed_form_says() {
     let absorption = Vec3::new(1.0, 0.5, 2.0);
     let sky = Equirect::procedural_sky();
     for (refractions, plane) in [(1, 0.0), (4, 0.0), (2, 0.7), (2, -0.2), (4, -1.0), (1, -1.0)] {
-        let settings = Settings { absorption, ..settings(refractions, 0) };
+        let settings = settings(refractions, 0).absorption(absorption);
         let case = case(RADIUS, &[], &[body], camera, settings);
         let painted = painted(SIZE, |_, _| 2.5 - plane);
         each_driver(|driver| {
@@ -121,7 +114,7 @@ fn a_plane_in_and_behind_a_slab_is_met_where_the_closed_form_says() {
                 let far = q.crossings(x, bent).expect("a ray inside leaves").1;
                 let (to_plane, wall) = (hit(x, bent), q.normal(x + far * bent));
                 let gap = (to_plane - far) * bent.dot(wall);
-                let limit = f64::from(WETTED * RADIUS);
+                let limit = f64::from(WETTING_GAP * RADIUS);
                 // A ray that ends close to where the rule changes may go either way.
                 if refractions > 1 && ((gap - limit).abs() < 0.1 * limit || (to_plane - far).abs() < 1e-3) {
                     continue;
@@ -193,7 +186,7 @@ fn a_plane_between_two_volumes_ends_the_ray() {
         each_driver(|driver| {
             let scene = HostScene::new(driver.gpu(), &camera, SIZE, &painted);
             let shot = driver.shoot_before(&case, scene.input(), Background::Environment);
-            let walk = shot.floats(Id::Walk, 0).expect("debug");
+            let walk = shot.floats("walk (debug)", 0).expect("debug");
             let mut found = 0;
             for p in pixels(&case, &shot) {
                 // Well inside: the ball sends these rays on to the middle of the view.
@@ -216,7 +209,7 @@ fn an_eye_inside_sees_the_scene_through_the_liquid() {
     let camera = view(eye, eye - Vec3::Z, 60.0);
     let absorption = Vec3::new(0.4, 0.2, 0.9);
     for refractions in [1, 2, 4] {
-        let mut case = case(RADIUS, &[], &[body], camera, Settings { absorption, ..settings(refractions, 0) });
+        let mut case = case(RADIUS, &[], &[body], camera, settings(refractions, 0).absorption(absorption));
         case.eye_inside = true;
         let painted = painted(SIZE, |_, _| 1.2);
         each_driver(|driver| {
@@ -295,7 +288,7 @@ fn random_scenes_are_met_as_the_twin_meets_them() {
     for background in [Background::Environment, Background::Host] {
         for (seed, refractions) in [(1, 4), (2, 2), (3, 1)] {
             let particles = random_cloud(seed, 0.12, Vec3::new(-0.8, -0.6, -0.5), Vec3::new(0.8, 0.6, 0.5), 12, 40);
-            let settings = Settings { refractions, absorption: tinted, ..Settings::default() };
+            let settings = Settings::default().refractions(refractions).absorption(tinted);
             let camera = crate::support::camera(Vec3::new(0.3, 0.4, 2.2), Vec3::ZERO, size);
             let case = crate::support::Case { particles, camera, settings, size, eye_inside: false };
             let painted = painted(size, blocks);
@@ -339,14 +332,14 @@ fn the_hosts_picture_stays_where_there_is_no_liquid() {
     each_driver(|driver| {
         let own = over(driver, BEFORE, |input| input, false);
         assert!(own.iter().all(|p| p[3] == 1.0), "{}: every pixel is written", driver.name);
-        let kept = over(driver, BEFORE, |input| FrameInput { background: Background::Host, ..input }, false);
+        let kept = over(driver, BEFORE, |input| input.background(Background::Host), false);
         let covered = kept.iter().filter(|p| p[3] == 1.0).count();
         println!("{}: {covered} of {} pixels show liquid", driver.name, kept.len());
         assert!(covered > 200 && covered < kept.len() / 2, "{}: {covered}", driver.name);
         for (own, kept) in own.iter().zip(&kept) {
             assert_eq!(if kept[3] == 1.0 { own } else { &BEFORE }, kept, "{}", driver.name);
         }
-        let empty = over(driver, BEFORE, |input| FrameInput { background: Background::Host, ..input }, true);
+        let empty = over(driver, BEFORE, |input| input.background(Background::Host), true);
         assert!(empty.iter().all(|p| *p == BEFORE), "{}: nothing is drawn without liquid", driver.name);
     });
 }
@@ -419,10 +412,8 @@ fn environments_may_be_the_hosts_own_images() {
                     let settings = Settings::default();
                     let output = Canvas::new(gpu, FLOAT4, 16, host::SIZE).expect("canvas");
                     output.write(&filled([0.0; 4]), vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL).expect("written");
-                    let input = FrameInput {
-                        environment: Some(EnvironmentInput { view, layout: READ, shape }),
-                        ..FrameInput::new(0, &camera, &settings, output.view)
-                    };
+                    let input = FrameInput::new(0, &camera, &settings, output.view)
+                        .environment(EnvironmentInput::new(view, READ, shape));
                     // SAFETY: as in `over`; the environment was written and is in this layout.
                     gpu.run(|cmd| Ok(unsafe { renderer.record(cmd, &input) }?)).expect("frame");
                     let floats: Vec<f32> = bytemuck::pod_collect_to_vec(&output.read().expect("picture"));

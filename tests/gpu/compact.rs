@@ -2,15 +2,16 @@
 
 use crate::{
     splat::case,
-    support::{Shot, camera, each_driver, random_cloud},
+    support::{Choose, Shot, camera, each_driver, random_cloud},
 };
 use glam::Vec3;
-use meniscus::{shader::COUNT_SPLASH_FRONT, targets::Id, twin::compact::compact};
+use meniscus::{shader::COUNT_SPLASH_FRONT, twin::compact::compact};
 
 /// The lists as the splat pass reads them: `[2 * class + side]`.
 fn lists(shot: &Shot) -> [Vec<u32>; 4] {
-    let (drawn, draws) = (shot.words(Id::Drawn, 0).expect("drawn"), shot.words(Id::Draws, 0).expect("draws"));
-    let count = shot.words(Id::Visible, 0).expect("visible").len();
+    let (drawn, draws) =
+        (shot.words("drawn particles", 0).expect("drawn"), shot.words("indirect draws", 0).expect("draws"));
+    let count = shot.words("visible particles", 0).expect("visible").len();
     std::array::from_fn(|l| {
         let draw = &draws[8 * l..][..8];
         assert!(draw[1] == 1 && draw[4] == 4 && (draw[0] == 0 || draw[5] == 0), "points or quads: {draw:?}");
@@ -33,10 +34,9 @@ fn lists_are_the_verdicts_in_order() {
         for (i, (splash, body)) in counts.into_iter().enumerate() {
             let cloud = random_cloud(i as u64, 0.02, Vec3::splat(-0.6), Vec3::splat(0.6), splash, body);
             let mut case = case(cloud, eye, size);
-            case.settings.refractions = if i == 4 { 1 } else { 4 };
-            case.settings.quads_only = i % 2 == 1;
+            case.settings = case.settings.refractions(if i == 4 { 1 } else { 4 }).quads_only(i % 2 == 1);
             let shot = driver.shoot(&case);
-            let want = compact(shot.words(Id::Visible, 0).expect("visible"));
+            let want = compact(shot.words("visible particles", 0).expect("visible"));
             let got = lists(&shot);
             for l in 0..4 {
                 assert_eq!(got[l], want[l], "{}: {splash} + {body}: list {l}", driver.name);

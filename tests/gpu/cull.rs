@@ -3,7 +3,7 @@
 
 use crate::{
     splat::{TARGETS, case, packed},
-    support::{Case, Driver, Random, Shot, camera, each_driver, random_cloud, sphere},
+    support::{Case, Choose, Driver, Random, Shot, camera, each_driver, random_cloud, sphere},
 };
 use glam::{Mat3, Vec3};
 use meniscus::{
@@ -13,7 +13,6 @@ use meniscus::{
     shader::{
         CLASS_BODY, CLASS_SPLASH, COUNT_SPLASH_FRONT, SIDE_BACK, SIDE_FRONT, VISIBLE_BACK, VISIBLE_BODY, VISIBLE_FRONT,
     },
-    targets::Id,
     twin::{cull::cull, splat::splat},
 };
 
@@ -30,7 +29,7 @@ pub fn assert_same(a: &Shot, b: &Shot, what: &str) {
 
 /// Whether the cull pass chose quads for a class.
 pub fn drawn_as_quads(shot: &Shot, class: u32) -> bool {
-    let draws = &shot.words(Id::Draws, 0).expect("there are particles")[16 * class as usize..][..8];
+    let draws = &shot.words("indirect draws", 0).expect("there are particles")[16 * class as usize..][..8];
     let quads = draws[5] > 0;
     assert!(quads != (draws[0] > 0), "either points or quads: {draws:?}");
     quads
@@ -63,7 +62,8 @@ pub fn around_the_near_plane() -> Case {
 
 /// Verdicts of one class as the GPU has them.
 fn verdicts(shot: &Shot, particles: &Particles, class: u32) -> Vec<u32> {
-    let (splash, body) = shot.words(Id::Visible, 0).expect("there are particles").split_at(particles.splash_count);
+    let (splash, body) =
+        shot.words("visible particles", 0).expect("there are particles").split_at(particles.splash_count);
     let (words, mark) = if class == CLASS_SPLASH { (splash, 0) } else { (body, VISIBLE_BODY) };
     assert!(words.iter().all(|v| *v == 0 || v & VISIBLE_BODY == mark), "every particle knows its class");
     words.iter().map(|v| v & (VISIBLE_FRONT | VISIBLE_BACK)).collect()
@@ -85,8 +85,8 @@ fn check(driver: &Driver, case: &Case, what: &str) -> Shot {
         }
         let label = format!("{}: {what}: class {class}", driver.name);
         // Splash particles are never tested against the body: the two volumes overlap.
-        let bounds = if class == CLASS_BODY { shot.words(Id::Bounds, 0) } else { None };
-        let sides = if case.settings.refractions == 1 { 1 } else { 2 };
+        let bounds = if class == CLASS_BODY { shot.words("body depth bounds", 0) } else { None };
+        let sides = if case.settings.walk().refractions == 1 { 1 } else { 2 };
         let want = cull(&shot.frame, &particles, bounds, sides);
         let got = verdicts(&shot, &case.particles, class);
         // A rectangle's edge on a pixel's centre, or a depth that equals a bound, may go either way in float32.
@@ -100,7 +100,7 @@ fn check(driver: &Driver, case: &Case, what: &str) -> Shot {
         }
         let limit = point_size(driver);
         if (want.largest_point - limit).abs() > 0.1 {
-            let quads = want.largest_point > limit || case.settings.quads_only;
+            let quads = want.largest_point > limit || case.settings.drawing.quads_only;
             assert_eq!(drawn_as_quads(&shot, class), quads, "{label}: {} px", want.largest_point);
         }
         // Any pixel's surface, if float32 can tell it from its rivals', belongs to a particle that is drawn.
@@ -120,9 +120,9 @@ fn check(driver: &Driver, case: &Case, what: &str) -> Shot {
 fn changes_no_bit(driver: &Driver, case: &Case, what: &str) -> [f64; 2] {
     let on = check(driver, case, what);
     let mut off = case.clone();
-    off.settings.occlusion_culling = false;
+    off.settings = off.settings.occlusion_culling(false);
     let off = driver.shoot(&off);
-    assert!(off.words(Id::Bounds, 0).is_none(), "nothing is bounded that nobody reads");
+    assert!(off.words("body depth bounds", 0).is_none(), "nothing is bounded that nobody reads");
     assert_same(&on, &off, &format!("{}: {what}", driver.name));
     [SIDE_FRONT, SIDE_BACK].map(|side| {
         let drawn = |shot: &Shot| f64::from(shot.counter(COUNT_SPLASH_FRONT + 2 * CLASS_BODY + side));
@@ -158,11 +158,11 @@ fn culling_of_a_real_frame_drops_a_third_and_changes_no_bit() {
 fn particles_at_the_near_plane_are_kept() {
     let crossing = around_the_near_plane();
     let mut fronts = crossing.clone();
-    fronts.settings.refractions = 1;
+    fronts.settings = fronts.settings.refractions(1);
     each_driver(|driver| {
         changes_no_bit(driver, &crossing, "near plane");
         let shot = check(driver, &fronts, "fronts only");
-        assert!(shot.words(Id::Visible, 0).unwrap().iter().all(|v| v & 2 == 0), "{}", driver.name);
+        assert!(shot.words("visible particles", 0).unwrap().iter().all(|v| v & 2 == 0), "{}", driver.name);
     });
 }
 
@@ -190,7 +190,7 @@ fn particles_outside_the_view_are_dropped() {
     ellipsoids.extend_from_within(..);
     let particles = Particles { radius: r, ellipsoids, splash_count };
     let mut case = case(particles, camera(Vec3::ZERO, Vec3::NEG_Z, size), size);
-    case.settings.occlusion_culling = false;
+    case.settings = case.settings.occlusion_culling(false);
     each_driver(|driver| {
         let shot = check(driver, &case, "edges of the view");
         for class in [CLASS_SPLASH, CLASS_BODY] {
@@ -208,7 +208,7 @@ fn quads_draw_what_points_draw() {
     each_driver(|driver| {
         for points in &cases {
             let mut quads = points.clone();
-            quads.settings.quads_only = true;
+            quads.settings = quads.settings.quads_only(true);
             let (a, b) = (driver.shoot(points), driver.shoot(&quads));
             assert!(!drawn_as_quads(&a, CLASS_BODY) && drawn_as_quads(&b, CLASS_BODY), "{}", driver.name);
             assert_same(&a, &b, &driver.name);

@@ -5,7 +5,6 @@ use glam::Vec3;
 use meniscus::{
     prepare::Search,
     shader::{COUNT_NOT_FINITE, EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_PASSES},
-    targets::Id,
     twin::extent::extent,
 };
 
@@ -19,7 +18,7 @@ fn boxes_cells_and_bits_are_the_twins() {
                 for (search, edge, more) in [(Search::Runs, 4.0, 0), (Search::Relation, 8.0, 1)] {
                     let want = extent(&positions, edge * radius, more);
                     let shot = driver.shoot_cloud(&crate::shape::empty(radius), &Cloud::new(&positions, search));
-                    let words = shot.words(Id::Extent, 0).expect("extent");
+                    let words = shot.words("extent", 0).expect("extent");
                     let three = |at: u32| <[u32; 3]>::try_from(&words[at as usize..][..3]).expect("three words");
                     let label = format!("{}: {name}: {search:?}, {lost} lost", driver.name);
                     let cells = (three(EXTENT_FIRST_CELL), three(EXTENT_LAST_CELL));

@@ -1,13 +1,13 @@
 //! The contract with the host: frames in flight, replaced resources, host scenes, output formats.
 
-use crate::support::{Case, Cloud, Driver, camera, each_driver, random_cloud, sphere};
+use crate::support::{Case, Choose, Cloud, Driver, camera, each_driver, random_cloud, sphere};
 use ash::vk;
 use glam::Vec3;
 use meniscus::{
     Equirect, Error, FrameInput, Particles, Renderer, SceneInput, Settings,
     host::{Canvas, Gpu, HostError, Upload},
     prepare::{DevicePositions, Search},
-    targets::Needs,
+    renderer::Amount,
     twin::optics::srgb_byte,
 };
 
@@ -76,7 +76,7 @@ fn two_frames_in_flight_from_positions_on_the_device() {
                         let canvas = &canvases[slot];
                         canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
                         let positions = DevicePositions::packed(uploads[slot].buffer, clouds[slot].len() as u32, 0.1);
-                        let input = FrameInput { positions: Some(positions), ..input(&case, slot, canvas.view) };
+                        let input = input(&case, slot, canvas.view).positions(positions);
                         // SAFETY: `cmd` is recording outside rendering; the slot's last frame was waited for by `run`.
                         unsafe { renderer.record(cmd, &input) }?;
                     }
@@ -107,8 +107,7 @@ fn two_frames_in_flight_with_everything_replaced_between() {
                 gpu.run(|cmd| {
                     for slot in 0..2 {
                         let mut case = clouds[2 * pair + slot].clone();
-                        case.settings.refractions = [4, 1][slot];
-                        case.settings.iterations = 1 + slot as u32;
+                        case.settings = case.settings.refractions([4, 1][slot]).iterations(1 + slot as u32);
                         renderer.set_particles(&case.particles)?;
                         let canvas = &canvases[slot];
                         canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
@@ -120,8 +119,7 @@ fn two_frames_in_flight_with_everything_replaced_between() {
                 .expect("frames");
                 for (slot, canvas) in canvases.iter().enumerate() {
                     let mut alone = clouds[2 * pair + slot].clone();
-                    alone.settings.refractions = [4, 1][slot];
-                    alone.settings.iterations = 1 + slot as u32;
+                    alone.settings = alone.settings.refractions([4, 1][slot]).iterations(1 + slot as u32);
                     assert_shows(canvas, &driver.shoot(&alone).picture, &format!("{}: slot {slot}", driver.name));
                 }
                 assert!(renderer.times(0).is_some() && renderer.times(1).is_some(), "{}: no times", driver.name);
@@ -135,8 +133,8 @@ fn memory_is_known_before_it_is_allocated() {
     each_driver(|driver| {
         with_renderer(driver, vk::Format::R32G32B32A32_SFLOAT, 1, |gpu, renderer| {
             let case = case(random_cloud(5, 0.1, Vec3::splat(-0.6), Vec3::splat(0.6), 5, 60));
-            let needs = Needs::new(SIZE, 5, 60, &case.settings, false);
-            let asked = renderer.memory_requirements(&needs).expect("a valid size");
+            let amount = Amount::Prepared { splash: 5, body: 60 };
+            let asked = renderer.memory_requirements(SIZE, amount, &case.settings).expect("a valid size");
             renderer.set_particles(&case.particles).expect("particles");
             let canvas = Canvas::new(gpu, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE).expect("canvas");
             gpu.run(|cmd| {
@@ -201,14 +199,12 @@ fn a_host_scene_is_hidden_seen_and_seen_through_the_liquid() {
                         canvas.transition(cmd, general, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
                     }
                     output.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
-                    let scene = SceneInput {
-                        color: color.view,
-                        color_layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
-                        depth: depth.view,
-                        depth_layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
-                        cleared_depth: 1.0,
-                    };
-                    let input = FrameInput { scene: Some(scene), ..input(&case, 0, output.view) };
+                    let scene = SceneInput::new(
+                        (color.view, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
+                        (depth.view, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
+                        1.0,
+                    );
+                    let input = input(&case, 0, output.view).scene(scene);
                     // SAFETY: as above; the scene was just brought into the stated layout.
                     Ok(unsafe { renderer.record(cmd, &input) }?)
                 })
@@ -268,8 +264,8 @@ fn what_the_caller_gets_wrong_is_said() {
             assert!(refused(&input(&case, 0, vk::ImageView::null())).contains("output is null"));
             let read = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
             let scene = |color, color_layout, cleared_depth| {
-                let scene = SceneInput { color, color_layout, depth: canvas.view, depth_layout: read, cleared_depth };
-                FrameInput { scene: Some(scene), ..input(&case, 0, canvas.view) }
+                let scene = SceneInput::new((color, color_layout), (canvas.view, read), cleared_depth);
+                input(&case, 0, canvas.view).scene(scene)
             };
             assert!(refused(&scene(vk::ImageView::null(), read, 1.0)).contains("scene colour is null"));
             assert!(
@@ -284,15 +280,15 @@ fn what_the_caller_gets_wrong_is_said() {
             let far_too_many = u32::try_from(u64::from(u32::MAX) / 2).expect("it fits");
             for (wrong, word) in [
                 (positions, "buffer of positions is null"),
-                (DevicePositions { offset: 6, ..positions }, "offset of positions is 6"),
-                (DevicePositions { offset: u64::MAX - 3, ..positions }, "beyond any buffer"),
-                (DevicePositions { stride: 8, ..positions }, "stride of positions is 8"),
-                (DevicePositions { stride: 13, ..positions }, "stride of positions is 13"),
-                (DevicePositions { radius: -1.0, ..positions }, "particle radius is -1"),
-                (DevicePositions { keep_class_below: Some(f32::NAN), ..positions }, "upper splash threshold"),
-                (DevicePositions { count: far_too_many, ..positions }, "particles is 2147483647"),
+                (positions.laid_out(6, 12), "offset of positions is 6"),
+                (positions.laid_out(u64::MAX - 3, 12), "beyond any buffer"),
+                (positions.laid_out(0, 8), "stride of positions is 8"),
+                (positions.laid_out(0, 13), "stride of positions is 13"),
+                (DevicePositions::packed(positions.buffer, 10, -1.0), "particle radius is -1"),
+                (positions.keep_class_below(f32::NAN), "upper splash threshold"),
+                (DevicePositions::packed(positions.buffer, far_too_many, 0.1), "particles is 2147483647"),
             ] {
-                let input = FrameInput { positions: Some(wrong), ..input(&case, 0, canvas.view) };
+                let input = input(&case, 0, canvas.view).positions(wrong);
                 let said = refused(&input);
                 assert!(said.contains(word), "{said}");
             }
@@ -332,12 +328,12 @@ fn frames_that_never_run_leave_no_trace() {
             let case = case(cloud);
             let canvas = Canvas::new(gpu, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE).expect("canvas");
             let packed = DevicePositions::packed(upload.buffer, positions.len() as u32, 0.1);
-            let kept = DevicePositions { keep_class_below: Some(0.6), ..packed };
+            let kept = packed.keep_class_below(0.6);
             let mut pictures = Vec::new();
             for (slot, runs) in [(0, true), (1, false), (0, true), (1, true), (0, false), (1, false), (0, true)] {
                 let done = gpu.run(|cmd| {
                     canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
-                    let input = FrameInput { positions: Some(kept), ..input(&case, slot, canvas.view) };
+                    let input = input(&case, slot, canvas.view).positions(kept);
                     // SAFETY: `cmd` is recording outside rendering; the slot's last frame was waited for, or abandoned.
                     unsafe { renderer.record(cmd, &input) }?;
                     // An error makes `run` throw the command buffer away.

@@ -1,10 +1,10 @@
 //! Normals of the smoothed body against their twin, which is fed the depths that the GPU itself smoothed.
 
-use crate::support::{Case, Driver, camera, each_driver, lattice, random_cloud, sphere};
+use crate::support::{Case, Choose, Driver, camera, each_driver, lattice, random_cloud, sphere};
 use glam::Vec3;
 use meniscus::shader::{COUNT_NORMAL_DEGENERATE, SIDE_BACK};
 use meniscus::twin::{normal::decode_normal, normals::normals, plane_fit::view_ray};
-use meniscus::{Particles, Settings, targets::Id};
+use meniscus::{Particles, Settings};
 
 /// 0.004 degrees for each of two roundings to a code, and as much for 32-bit differences.
 const TOLERANCE: f64 = 0.02;
@@ -12,14 +12,18 @@ const TOLERANCE: f64 = 0.02;
 /// Returns how many pixels kept the ray-cast normal.
 fn check(driver: &Driver, name: &str, case: &Case) -> u32 {
     let shot = driver.shoot(case);
-    let smoothed = if case.settings.iterations % 2 == 1 { Id::BodyDepthA } else { Id::BodyDepthB };
+    let smoothed = if case.settings.fit().iterations % 2 == 1 {
+        "body depth (smoothed, odd)"
+    } else {
+        "body depth (smoothed, even)"
+    };
     let (mut degenerate, mut seen) = (0, 0u32);
     let (mut off, mut ties) = (0u32, 0u32);
     for layer in 0..2 {
         let label = format!("{}, {name}, layer {layer}", driver.name);
         let depth = shot.floats(smoothed, layer).expect("smoothed depth");
-        let raw = shot.words(Id::BodyNormalRaw, layer).expect("normals");
-        let found = shot.words(Id::BodyNormal, layer).expect("smoothed normals");
+        let raw = shot.words("body normal (ray-cast)", layer).expect("normals");
+        let found = shot.words("body normal (smoothed)", layer).expect("smoothed normals");
         let twin = normals(&shot.frame, &depth, raw, layer);
         degenerate += twin.degenerate;
         for (i, d) in depth.iter().enumerate() {
@@ -56,7 +60,7 @@ fn check(driver: &Driver, name: &str, case: &Case) -> u32 {
 }
 
 fn settings(iterations: u32) -> Settings {
-    Settings { refractions: 2, internal_reflections: 0, iterations, ..Settings::default() }
+    Settings::default().refractions(2).reflections(0).iterations(iterations)
 }
 
 #[test]

@@ -1,10 +1,13 @@
 //! Plane fitting against its twin, which is fed the depths and normals that the GPU itself read.
 
-use crate::support::{Case, Driver, Random, Shot, camera, each_driver, lattice, random_cloud, sphere};
+use crate::support::{Case, Choose, Driver, Random, Shot, camera, each_driver, lattice, random_cloud, sphere};
 use glam::{Mat3, Vec3};
-use meniscus::shader::{COUNT_FIT_GRAZING, COUNT_FIT_UNBOUNDED, COUNT_FIT_ZERO_NORMAL};
+use meniscus::shader::{
+    COUNT_FIT_GRAZING, COUNT_FIT_UNBOUNDED, COUNT_FIT_ZERO_NORMAL, FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT,
+};
+use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
 use meniscus::twin::plane_fit::{LEAST_AGREEMENT, Outcome, Plane, plane_fit};
-use meniscus::{Camera, Ellipsoid, Particles, Settings, Weighting, targets::Id};
+use meniscus::{Camera, Ellipsoid, Particles, Settings};
 
 /// Guards in the order of their counters.
 const GUARDS: [(Outcome, u32); 3] = [
@@ -27,21 +30,27 @@ struct Seen {
 
 /// Settings for these tests: cheap optics, which come after what is tested, and both sides.
 fn settings(window: u32, iterations: u32, sigma: f32, weighting: Weighting) -> Settings {
-    Settings { refractions: 2, internal_reflections: 0, window, iterations, sigma, weighting, ..Settings::default() }
+    {
+        let mut settings = Settings::default().refractions(2).reflections(0);
+        let fit = PlaneFit::default().window(window).iterations(iterations).sigma(sigma).weighting(weighting);
+        settings.method.smooth = fit.into();
+        settings
+    }
 }
 
 /// Error of eq. (5) in 32 bits. Storage rounds by half a step of the depth. The fraction is one of sums whose terms (up
 /// to the depth itself sideways; weights leave about sigma of rise) are rounded to a step or two of the largest; what
 /// it is divided by is n.v times the length of the sum of normals.
-fn rounding(shot: &Shot, own: f32, plane: &Plane) -> f64 {
-    let [own, sigma] = [own, shot.frame.smoothing.x].map(f64::from);
+fn rounding(fit: &PlaneFit, own: f32, plane: &Plane) -> f64 {
+    let [own, sigma] = [own, fit.sigma].map(f64::from);
     let magnitude = own + (plane.depth - own).abs() + sigma;
     f64::from(f32::EPSILON) * magnitude * (0.5 + 2.0 / (plane.facing * plane.agreement))
 }
 
 /// Whether rounding decides if a guard fires.
-fn is_close(shot: &Shot, own: f32, plane: &Plane) -> bool {
-    let [limit, grazing, near] = [shot.frame.smoothing.y, shot.frame.smoothing.z, shot.frame.viewport.z].map(f64::from);
+fn is_close(fit: &PlaneFit, shot: &Shot, own: f32, plane: &Plane) -> bool {
+    let limits = [FIT_UPDATE_LIMIT * fit.sigma, FIT_GRAZING_LIMIT, shot.frame.near];
+    let [limit, grazing, near] = limits.map(f64::from);
     if (plane.agreement - LEAST_AGREEMENT).abs() < 5e-7 {
         return true;
     }
@@ -51,20 +60,20 @@ fn is_close(shot: &Shot, own: f32, plane: &Plane) -> bool {
     if (plane.facing - grazing).abs() < 1e-6 / plane.agreement {
         return true;
     }
-    let slack = rounding(shot, own, plane);
+    let slack = rounding(fit, own, plane);
     let update = (plane.depth - f64::from(own)).abs();
     plane.facing > grazing && ((update - limit).abs() < slack || (plane.depth - near).abs() < slack)
 }
 
 /// Compares one iteration on both layers, from image `from` of one shot to image `to` of another (or the same one).
-fn compare(label: &str, settings: &Settings, from: (&Shot, Id), to: (&Shot, Id)) -> Seen {
+fn compare(label: &str, settings: &PlaneFit, from: (&Shot, &'static str), to: (&Shot, &'static str)) -> Seen {
     let shot = to.0;
     let mut seen = Seen::default();
     for layer in 0..2 {
         let input = from.0.floats(from.1, layer).expect("input");
         let output = to.0.floats(to.1, layer).expect("output");
-        let normal = shot.words(Id::BodyNormalRaw, layer).expect("normals");
-        let fit = plane_fit(&shot.frame, &input, normal, settings.window, settings.weighting);
+        let normal = shot.words("body normal (ray-cast)", layer).expect("normals");
+        let fit = plane_fit(&shot.frame, &input, normal, settings);
         for (i, plane) in fit.plane.iter().enumerate() {
             let at =
                 || format!("{label}, layer {layer}, pixel {}, {}", i as u32 % shot.size[0], i as u32 / shot.size[0]);
@@ -77,7 +86,7 @@ fn compare(label: &str, settings: &Settings, from: (&Shot, Id), to: (&Shot, Id))
             for (count, (guard, _)) in seen.guards.iter_mut().zip(GUARDS) {
                 *count += u32::from(outcome == guard);
             }
-            let undecided = is_close(shot, input[i], plane);
+            let undecided = is_close(settings, shot, input[i], plane);
             seen.close += u32::from(undecided);
             if kept && (undecided || outcome != Outcome::Fitted) {
                 continue;
@@ -90,7 +99,7 @@ fn compare(label: &str, settings: &Settings, from: (&Shot, Id), to: (&Shot, Id))
                 input[i],
                 output[i]
             );
-            let (error, tolerance) = ((f64::from(output[i]) - plane.depth).abs(), rounding(shot, input[i], plane));
+            let (error, tolerance) = ((f64::from(output[i]) - plane.depth).abs(), rounding(settings, input[i], plane));
             assert!(error <= tolerance, "{}: {} for {plane:?}, from {}", at(), output[i], input[i]);
             seen.fitted += 1;
             seen.worst = seen.worst.max(error / tolerance);
@@ -128,12 +137,17 @@ fn assert_counted(label: &str, counted: [u32; 3], seen: &[Seen]) {
 
 /// Two iterations of one frame: both images are still there, so each step can be checked on its own input.
 fn check_two(driver: &Driver, name: &str, case: &Case) -> Shot {
-    let s = &case.settings;
+    let s = &case.settings.fit();
     let label = format!("{}, {name}, window {}, sigma {} r, {:?}", driver.name, s.window, s.sigma, s.weighting);
     let shot = driver.shoot(case);
     let seen = [
-        compare(&format!("{label}, first"), s, (&shot, Id::BodyDepthRaw), (&shot, Id::BodyDepthA)),
-        compare(&format!("{label}, second"), s, (&shot, Id::BodyDepthA), (&shot, Id::BodyDepthB)),
+        compare(&format!("{label}, first"), s, (&shot, "body depth (ray-cast)"), (&shot, "body depth (smoothed, odd)")),
+        compare(
+            &format!("{label}, second"),
+            s,
+            (&shot, "body depth (smoothed, odd)"),
+            (&shot, "body depth (smoothed, even)"),
+        ),
     ];
     assert_counted(&label, counters(&shot), &seen);
     let fitted = seen.iter().map(|s| s.fitted).sum::<usize>();
@@ -164,7 +178,7 @@ fn random_clouds() {
                 eye_inside: false,
             };
             let shot = check_two(driver, "cloud", &case);
-            let front = shot.floats(Id::BodyDepthRaw, 0).unwrap();
+            let front = shot.floats("body depth (ray-cast)", 0).unwrap();
             assert!(front.contains(&0.0), "there are gaps");
             let [w, h] = size.map(|s| s as usize);
             let borders: [Vec<f32>; 4] = [
@@ -206,7 +220,7 @@ fn the_eye_in_a_particle() {
     each_driver(|driver| {
         let case = eye_in_a_particle();
         let shot = check_two(driver, "eye inside", &case);
-        let front = shot.floats(Id::BodyDepthB, 0).unwrap();
+        let front = shot.floats("body depth (smoothed, even)", 0).unwrap();
         let negative = front.iter().filter(|d| **d < 0.0).count();
         assert!(negative > 50 && negative < 10_000, "{}: {negative} pixels start inside", driver.name);
     });
@@ -267,11 +281,16 @@ fn normals_that_cancel() {
             eye_inside: false,
         };
         let shot = driver.shoot(&case);
-        let seen = compare(&driver.name, &case.settings, (&shot, Id::BodyDepthRaw), (&shot, Id::BodyDepthA));
+        let seen = compare(
+            &driver.name,
+            &case.settings.fit(),
+            (&shot, "body depth (ray-cast)"),
+            (&shot, "body depth (smoothed, odd)"),
+        );
         assert_counted(&driver.name, counters(&shot), &[seen]);
         assert_eq!(counters(&shot)[0], 2, "{}: the middle pixels of the front", driver.name);
-        let [raw, fitted] =
-            [Id::BodyDepthRaw, Id::BodyDepthA].map(|id| shot.words(id, 0).unwrap()[4 * 8 + 3..][..2].to_vec());
+        let [raw, fitted] = ["body depth (ray-cast)", "body depth (smoothed, odd)"]
+            .map(|id| shot.words(id, 0).unwrap()[4 * 8 + 3..][..2].to_vec());
         assert_eq!(raw, fitted);
     });
 }
@@ -290,11 +309,11 @@ fn a_dam_break_iterated() {
             let label = format!("{}, dam break, iteration {n}", driver.name);
             let shot = driver.shoot(&case);
             let (from, to) = match n {
-                1 => (Id::BodyDepthRaw, Id::BodyDepthA),
-                n if n % 2 == 0 => (Id::BodyDepthA, Id::BodyDepthB),
-                _ => (Id::BodyDepthB, Id::BodyDepthA),
+                1 => ("body depth (ray-cast)", "body depth (smoothed, odd)"),
+                n if n % 2 == 0 => ("body depth (smoothed, odd)", "body depth (smoothed, even)"),
+                _ => ("body depth (smoothed, even)", "body depth (smoothed, odd)"),
             };
-            let seen = compare(&label, &case.settings, (&shot, from), (&shot, to));
+            let seen = compare(&label, &case.settings.fit(), (&shot, from), (&shot, to));
             let mut counted = counters(&shot);
             if let Some(before) = &before {
                 (0..3).for_each(|k| counted[k] -= counters(before)[k]);

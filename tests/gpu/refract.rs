@@ -2,13 +2,12 @@
 
 use crate::{
     background::{HostScene, Painted},
-    support::{Case, Driver, Shot, camera, each_driver, random_cloud},
+    support::{Case, Choose, Driver, Shot, camera, each_driver, random_cloud},
 };
 use glam::{DVec3, Vec3};
 use meniscus::{
     Background, Equirect, Fresnel, Particles, Settings,
     shader::{OUTCOME_HIT, OUTCOME_SCENE, PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH_SPLASH},
-    targets::{Id, Needs},
     twin::{
         background::Scene,
         refract::{Walk, walk},
@@ -24,10 +23,12 @@ struct OwnMaps([[(Vec<f32>, Vec<u32>); 2]; 2]);
 
 impl OwnMaps {
     fn of(case: &Case, shot: &Shot) -> OwnMaps {
-        let (splash, body) = (case.particles.splash_count, case.particles.body_count());
-        let needs = Needs::new(case.size, splash, body, &case.settings, true);
-        let ids = [(Id::SplashDepth, Id::SplashNormal), (needs.body_depth(), needs.body_normal())];
-        OwnMaps(ids.map(|(depth, normal)| {
+        let body = match case.settings.fit().iterations {
+            0 => ("body depth (ray-cast)", "body normal (ray-cast)"),
+            n if n % 2 == 1 => ("body depth (smoothed, odd)", "body normal (smoothed)"),
+            _ => ("body depth (smoothed, even)", "body normal (smoothed)"),
+        };
+        OwnMaps([("splash depth", "splash normal"), body].map(|(depth, normal)| {
             [0, 1].map(|side| {
                 let words = shot.words(normal, side).unwrap_or_default().to_vec();
                 (shot.floats(depth, side).unwrap_or_default(), words)
@@ -68,16 +69,17 @@ struct Pair {
 
 /// Every pixel of a frame, or every fourth: the twin's march is slow.
 fn pairs(driver: &Driver, case: &Case, shot: &Shot, scene: Option<Scene>, sky: &Equirect) -> Vec<Pair> {
-    let (walks, directions) = (shot.floats(Id::Walk, 0).unwrap(), shot.floats(Id::Direction, 0).unwrap());
+    let (walks, directions) =
+        (shot.floats("walk (debug)", 0).unwrap(), shot.floats("final direction (debug)", 0).unwrap());
     let numbers = walks.iter().chain(&directions).chain(shot.picture.as_flattened());
     assert!(numbers.into_iter().all(|v| v.is_finite()), "{}: not finite", driver.name);
     let own = OwnMaps::of(case, shot);
     let maps = Maps { scene, ..own.twin(shot) };
     let width = case.size[0] as usize;
-    let chosen = |i: &usize| case.settings.refractions == 1 || (i % width + i / width * 2).is_multiple_of(4);
+    let chosen = |i: &usize| case.settings.walk().refractions == 1 || (i % width + i / width * 2).is_multiple_of(4);
     let pixels: Vec<usize> = (0..walks.len() / 4).filter(chosen).collect();
     let pair = |index: usize| {
-        let twin = walk(&maps, &case.settings, sky, [index % width, index / width]);
+        let twin = walk(&maps, &case.settings.walk(), sky, [index % width, index / width]);
         let (w, d) = (&walks[4 * index..], &directions[4 * index..]);
         let angle = degrees(DVec3::new(f64::from(d[0]), f64::from(d[1]), f64::from(d[2])), twin.direction);
         let color = Vec3::from(shot.picture[index]);
@@ -103,7 +105,7 @@ fn at_least(what: &str, driver: &Driver, pairs: &[&Pair], share: f64, good: impl
 }
 
 fn compare(driver: &Driver, case: &Case, sky: &Equirect) {
-    let s = &case.settings;
+    let s = &case.settings.walk();
     println!("  refractions {}, reflections {}, {:?}:", s.refractions, s.internal_reflections, s.fresnel);
     let pairs = pairs(driver, case, &driver.shoot(case), None, sky);
     for pair in &pairs {
@@ -145,14 +147,14 @@ pub fn compare_before(driver: &Driver, case: &Case, painted: &Painted, backgroun
     let scene = Scene { depth: &depth, color: &painted.1, sky: background == Background::Host };
     let pairs = pairs(driver, case, &shot, Some(scene), &Equirect::procedural_sky());
     let (liquid, other): (Vec<_>, Vec<_>) = pairs.iter().partition(|p| p.pattern != PATTERN_NONE);
-    println!("  {background:?}, refractions {}: {} pixels of liquid", case.settings.refractions, liquid.len());
+    println!("  {background:?}, refractions {}: {} pixels of liquid", case.settings.walk().refractions, liquid.len());
     assert!(liquid.len() > 500, "{}: only {} pixels of liquid", driver.name, liquid.len());
     at_least("first volume", driver, &liquid, 0.999, |p| first_volume(p.pattern) == first_volume(p.twin.pattern));
     at_least("no liquid", driver, &other, 0.999, |p| p.twin.pattern == PATTERN_NONE);
     if background == Background::Environment {
         at_least("straight through", driver, &other, 0.999, |p| same_color(p, 0.01));
     }
-    if case.settings.refractions > 1 {
+    if case.settings.walk().refractions > 1 {
         let met: Vec<_> = liquid.iter().copied().filter(|p| p.outcome == OUTCOME_SCENE).collect();
         assert!(met.len() > 300, "{}: only {} pixels meet the scene", driver.name, met.len());
         at_least("the scene is met", driver, &met, 0.97, |p| p.twin.outcome == OUTCOME_SCENE);
@@ -168,7 +170,12 @@ pub fn compare_before(driver: &Driver, case: &Case, painted: &Painted, backgroun
 }
 
 fn optics(refractions: u32, internal_reflections: u32, fresnel: Fresnel, absorption: Vec3) -> Settings {
-    Settings { refractions, internal_reflections, fresnel, absorption, ..Settings::default() }
+    {
+        let mut settings =
+            Settings::default().refractions(refractions).reflections(internal_reflections).absorption(absorption);
+        settings.set("fresnel", if fresnel == Fresnel::Exact { "exact" } else { "schlick" }).expect("a parameter");
+        settings
+    }
 }
 
 const CLEAR: Vec3 = Vec3::ZERO;
@@ -232,7 +239,8 @@ fn random_clouds_are_walked_as_their_twin_walks_them() {
 fn what_absorbs_everything_is_black() {
     let size = [1024, 768];
     let dam_break = crate::splat::dam_break();
-    let settings = Settings { absorption: Vec3::new(1e30, 3e38, 0.0), sigma: 180.0, ..Settings::default() };
+    let mut settings = Settings::default().absorption(Vec3::new(1e30, 3e38, 0.0));
+    settings.set("sigma", "180").expect("a parameter");
     let aspect = size[0] as f32 / size[1] as f32;
     let projection = glam::camera::rh::proj::vulkan::perspective_infinite(45f32.to_radians(), aspect, 0.01);
     let camera = meniscus::Camera { projection, ..dam_break.camera };

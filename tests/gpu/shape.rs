@@ -1,7 +1,7 @@
 //! Neighbours, classes and ellipsoids prepared on the device: the same sets as trying every pair, and what the CPU
 //! prepares.
 
-use crate::support::{Case, Cloud, Driver, Random, Shot, camera, each_driver};
+use crate::support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_driver};
 use glam::Vec3;
 use meniscus::{
     Class, Particles, Settings,
@@ -9,7 +9,6 @@ use meniscus::{
     shader::{
         COUNT_BODY, COUNT_CLAMPED_LONG, COUNT_CLAMPED_RATIO, COUNT_DEGENERATE, COUNT_FEW_NEIGHBOURS, COUNT_SPLASH,
     },
-    targets::Id,
     twin::shape::neighbours,
 };
 
@@ -19,7 +18,7 @@ pub fn empty(radius: f32) -> Case {
     Case {
         particles: Particles { radius, ellipsoids: Vec::new(), splash_count: 0 },
         camera: camera(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, size),
-        settings: Settings { refractions: 1, ..Settings::default() },
+        settings: Settings::default().refractions(1),
         size,
         eye_inside: false,
     }
@@ -73,7 +72,7 @@ fn scattered_far(v: Vec3) -> Vec<Vec3> {
 
 /// Each input index's neighbours, ascending; the places of the particles in the order of the device.
 fn listed(shot: &Shot, count: usize) -> (Vec<Vec<u32>>, Vec<usize>) {
-    let words = shot.words(Id::Neighbours, 0).expect("neighbours");
+    let words = shot.words("neighbours (debug)", 0).expect("neighbours");
     let room = words.len() / count;
     let (mut lists, mut places) = (vec![Vec::new(); count], vec![usize::MAX; count]);
     for (k, list) in words.chunks(room).enumerate() {
@@ -114,7 +113,8 @@ fn agrees(driver: &Driver, name: &str, radius: f32, positions: &[Vec3], options:
     let classes = classify(positions, radius, options, None).expect("classes");
     let label = format!("{}: {name}: {:?}", driver.name, options.search);
     let read = |id| shot.floats(id, 0).expect("prepared");
-    let (centers, diagonals, mixed) = (read(Id::Centers), read(Id::Diagonals), read(Id::Mixed));
+    let (centers, diagonals, mixed) =
+        (read("particle centres"), read("particle shapes (diagonal)"), read("particle shapes (mixed)"));
     let three = |all: &[f32], k: usize| Vec3::from_slice(&all[3 * k..]);
     // One particle after the other through the CPU's path keeps the input's order.
     let given: Vec<Class> = classes.clone();
@@ -176,7 +176,8 @@ fn positions_may_lie_anywhere_in_a_buffer() {
         let bits = |offset, stride| {
             let cloud = Cloud { offset, stride, ..Cloud::new(&positions, Search::Runs) };
             let shot = driver.shoot_cloud(&empty(radius), &cloud);
-            [Id::Centers, Id::Diagonals, Id::Mixed].map(|id| shot.words(id, 0).expect("prepared").to_vec())
+            ["particle centres", "particle shapes (diagonal)", "particle shapes (mixed)"]
+                .map(|id| shot.words(id, 0).expect("prepared").to_vec())
         };
         let want = bits(0, 12);
         for (offset, stride) in [(0, 16), (4, 12), (252, 32), (1040, 48)] {
@@ -231,7 +232,7 @@ fn classes_are_kept_between_two_thresholds() {
             let positions = at(0.06 + 0.01 * (12 - (step - 12_i32).abs()) as f32);
             let cloud = Cloud { keep_class_below: Some(upper), ..Cloud::new(&positions, Search::Runs) };
             let shot = driver.shoot_cloud(&empty(radius), &cloud);
-            let got: Vec<u32> = shot.words(Id::LastClasses, 0).expect("kept").to_vec();
+            let got: Vec<u32> = shot.words("last classes", 0).expect("kept").to_vec();
             let want = classify(&positions, radius, &options, last.as_deref().map(|l| (l, upper))).expect("classes");
             assert_eq!(got, want.iter().map(|c| *c as u32).collect::<Vec<_>>(), "{}: step {step}", driver.name);
             let free = classify(&positions, radius, &options, None).expect("classes");
@@ -258,7 +259,8 @@ fn what_is_not_finite_is_left_out() {
             for slot in [COUNT_SPLASH, COUNT_BODY, COUNT_FEW_NEIGHBOURS] {
                 assert_eq!(shot.counter(slot), clean.counter(slot), "{}: {search:?}", driver.name);
             }
-            let nothing = shot.floats(Id::Diagonals, 0).expect("shapes").chunks(3).filter(|d| d[0] == 0.0).count();
+            let nothing =
+                shot.floats("particle shapes (diagonal)", 0).expect("shapes").chunks(3).filter(|d| d[0] == 0.0).count();
             assert_eq!(nothing, holed.len() - finite.len(), "{}: {search:?}", driver.name);
             assert_eq!(listed(&shot, holed.len()).0, neighbours(&holed, 8.0 * radius), "{}: {search:?}", driver.name);
             assert!(shot.picture.iter().flatten().all(|v| v.is_finite()), "{}", driver.name);

@@ -2,7 +2,7 @@
 
 use crate::support::{Case, camera, each_driver, random_cloud};
 use glam::Vec3;
-use meniscus::{Settings, targets::Id};
+use meniscus::Settings;
 
 #[test]
 fn a_random_cloud_renders() {
@@ -16,7 +16,7 @@ fn a_random_cloud_renders() {
     };
     each_driver(|driver| {
         let shot = driver.shoot(&case);
-        let front = shot.floats(Id::BodyDepthRaw, 0).expect("there is a body");
+        let front = shot.floats("body depth (ray-cast)", 0).expect("there is a body");
         assert!(front.iter().filter(|d| **d > 0.0).count() > 1000, "{}", driver.name);
         assert!(shot.picture.iter().flatten().all(|v| v.is_finite() && *v >= 0.0), "{}", driver.name);
     });

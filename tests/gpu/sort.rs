@@ -5,15 +5,14 @@ use glam::Vec3;
 use meniscus::{
     prepare::Search,
     shader::EXTENT_PASSES,
-    targets::Id,
     twin::sort::{relation, sort},
 };
 
 /// Entries as the last pass of the sort left them.
 fn order(driver: &Driver, positions: &[Vec3], radius: f32, search: Search) -> (Vec<u32>, u32) {
     let shot = driver.shoot_cloud(&crate::shape::empty(radius), &Cloud::new(positions, search));
-    let passes = shot.words(Id::Extent, 0).expect("extent")[EXTENT_PASSES as usize];
-    let all = shot.words(Id::Order, 0).expect("order");
+    let passes = shot.words("extent", 0).expect("extent")[EXTENT_PASSES as usize];
+    let all = shot.words("sort order", 0).expect("order");
     let half = all.len() / 2;
     if passes == 0 {
         return ((0..half as u32).collect(), 0);

@@ -2,13 +2,12 @@
 
 use crate::{
     cull::assert_same,
-    support::{Case, Cloud, Driver, Random, Shot, camera, each_driver, random_cloud},
+    support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_driver, random_cloud},
 };
 use glam::{Mat3, Mat4, Vec3};
 use meniscus::{
     Camera, Ellipsoid, Particles, Settings,
     prepare::{Input, Options, Search, prepare},
-    targets::Id,
 };
 
 const SIZE: [u32; 2] = [160, 120];
@@ -35,7 +34,7 @@ fn scaled(scale: f32, shift: Vec3) -> (Case, Vec<Vec3>) {
     let aspect = SIZE[0] as f32 / SIZE[1] as f32;
     let eye = Vec3::new(0.6, 0.8, 3.0) * scale + shift;
     let camera = Camera::look_at(eye, shift, Vec3::Y, 45f32.to_radians(), aspect, 0.01 * scale);
-    let settings = Settings { absorption: Vec3::new(0.2, 0.6, 0.9) / scale, ..Settings::default() };
+    let settings = Settings::default().absorption(Vec3::new(0.2, 0.6, 0.9) / scale);
     (Case { particles, camera, settings, size: SIZE, eye_inside: false }, positions)
 }
 
@@ -46,7 +45,7 @@ fn different(a: &Shot, b: &Shot) -> usize {
 }
 
 fn liquid_pixels(shot: &Shot) -> usize {
-    shot.floats(Id::Walk, 0).expect("debug").chunks(4).filter(|w| w[0] != 0.0).count()
+    shot.floats("walk (debug)", 0).expect("debug").chunks(4).filter(|w| w[0] != 0.0).count()
 }
 
 /// Rounding moves a ray here and there past a wall's edge, or the sun's.
@@ -120,7 +119,7 @@ fn radii_without_room_are_refused() {
 
 /// Pixels that only one of two frames covers.
 fn covered_off(a: &Shot, b: &Shot) -> usize {
-    let [a, b] = [a, b].map(|s| s.floats(Id::BodyDepthRaw, 0).expect("a body"));
+    let [a, b] = [a, b].map(|s| s.floats("body depth (ray-cast)", 0).expect("a body"));
     a.iter().zip(&b).filter(|(a, b)| (**a > 0.0) != (**b > 0.0)).count()
 }
 
@@ -140,15 +139,20 @@ fn a_left_handed_world_is_drawn_as_its_mirror_image() {
     left.camera.validate().expect("a reflection is rigid");
     each_driver(|driver| {
         let (a, b) = (driver.shoot(&right), driver.shoot(&left));
-        for id in
-            [Id::SplashDepth, Id::SplashNormal, Id::BodyDepthRaw, Id::BodyNormalRaw, Id::BodyDepthB, Id::BodyNormal]
-        {
+        for id in [
+            "splash depth",
+            "splash normal",
+            "body depth (ray-cast)",
+            "body normal (ray-cast)",
+            "body depth (smoothed, even)",
+            "body normal (smoothed)",
+        ] {
             for layer in 0..2 {
                 assert!(a.words(id, layer) == b.words(id, layer), "{}: {id:?} {layer}", driver.name);
             }
         }
-        assert!(a.words(Id::Walk, 0) == b.words(Id::Walk, 0), "{}: walks", driver.name);
-        let directions = [&a, &b].map(|s| s.floats(Id::Direction, 0).expect("debug"));
+        assert!(a.words("walk (debug)", 0) == b.words("walk (debug)", 0), "{}: walks", driver.name);
+        let directions = [&a, &b].map(|s| s.floats("final direction (debug)", 0).expect("debug"));
         for (a, b) in directions[0].chunks(4).zip(directions[1].chunks(4)) {
             assert!([a[0], a[1], -a[2]] == [b[0], b[1], b[2]], "{}: {a:?} {b:?}", driver.name);
         }
@@ -170,7 +174,7 @@ fn crowds_take_no_longer_than_liquid() {
     let case = Case {
         particles,
         camera: camera(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, SIZE),
-        settings: Settings { refractions: 1, ..Settings::default() },
+        settings: Settings::default().refractions(1),
         size: SIZE,
         eye_inside: false,
     };
@@ -182,7 +186,7 @@ fn crowds_take_no_longer_than_liquid() {
         for (what, shot) in [("host", &host), ("device", &device)] {
             let drawn = shot.counter(meniscus::shader::COUNT_BODY_FRONT);
             assert_eq!(drawn, 3, "{}: {what}: {drawn} drawn", driver.name);
-            assert!(shot.floats(Id::BodyDepthRaw, 0).expect("drawn").iter().filter(|d| **d > 0.0).count() > 100);
+            assert!(shot.floats("body depth (ray-cast)", 0).expect("drawn").iter().filter(|d| **d > 0.0).count() > 100);
         }
         assert_eq!(different(&host, &device), 0, "{}", driver.name);
         assert!(start.elapsed().as_secs() < 60, "{}: {:?}", driver.name, start.elapsed());

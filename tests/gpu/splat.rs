@@ -2,19 +2,19 @@
 
 use crate::{
     cull::{around_the_near_plane, both, drawn_as_quads, point_size},
-    support::{Case, Driver, Random, Shot, camera, each_driver, random_cloud, sphere},
+    support::{Case, Choose, Driver, Random, Shot, camera, each_driver, random_cloud, sphere},
 };
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{
     Camera, Ellipsoid, Equirect, Particles, Settings,
     shader::{CLASS_BODY, CLASS_SPLASH, Particle, SIDE_BACK, SIDE_FRONT},
     space::Space,
-    targets::Id,
     twin::{self, normal::decode_normal, quadric::pixel_ray},
 };
 
 /// Depth and normal target of each class.
-pub const TARGETS: [(Id, Id); 2] = [(Id::SplashDepth, Id::SplashNormal), (Id::BodyDepthRaw, Id::BodyNormalRaw)];
+pub const TARGETS: [(&str, &str); 2] =
+    [("splash depth", "splash normal"), ("body depth (ray-cast)", "body normal (ray-cast)")];
 
 /// The particles of one class as the GPU reads them.
 pub fn packed(particles: &Particles, class: u32) -> Vec<Particle> {
@@ -70,7 +70,7 @@ fn tolerance(pixels: f64) -> Tolerance {
 /// Compares all layers with the twin's. The twin draws every particle: what the cull pass drops must not be missed.
 fn check(driver: &Driver, case: &Case, what: &str, tolerance: Tolerance) -> Shot {
     // What is not looked at here need not be computed: smoothing, reflections.
-    let settings = Settings { iterations: 0, internal_reflections: 0, refractions: 2, ..case.settings };
+    let settings = case.settings.refractions(2).reflections(0).iterations(0);
     let shot = driver.shoot(&Case { settings, ..case.clone() });
     for (class, (depth_id, normal_id)) in [CLASS_SPLASH, CLASS_BODY].into_iter().zip(TARGETS) {
         let particles = packed(&case.particles, class);
@@ -96,7 +96,7 @@ fn check_layer(
     tolerance: Tolerance,
     label: &str,
 ) {
-    let near = f64::from(shot.frame.viewport.z);
+    let near = f64::from(shot.frame.near);
     let (mut covered, mut outlines, mut far, mut tilted) = (0usize, 0usize, 0usize, 0usize);
     let (mut sum, mut most, mut turn) = (0.0f64, 0.0f64, 0.0f64);
     for (pixel, ((want, got), normal)) in layer.iter().zip(depth).zip(normal).enumerate() {
@@ -246,7 +246,7 @@ fn centres_outside_the_view_still_cover_pixels() {
     each_driver(|driver| {
         let case = case(particles.clone(), camera(Vec3::ZERO, Vec3::NEG_Z, size), size);
         let shot = check(driver, &case, "centres outside", tolerance(14.0));
-        let covered = shot.floats(Id::SplashDepth, 0).unwrap().iter().filter(|d| **d > 0.0).count();
+        let covered = shot.floats("splash depth", 0).unwrap().iter().filter(|d| **d > 0.0).count();
         assert!(covered > 400, "{}: {covered}", driver.name);
     });
 }
@@ -258,12 +258,12 @@ fn particles_at_the_near_plane_match_the_twin() {
     around.particles.ellipsoids.push(Ellipsoid { center: Vec3::new(0.05, 0.0, 0.1), ..sphere(Vec3::ZERO, 1.0) });
     each_driver(|driver| {
         let shot = check(driver, &crossing, "near plane", tolerance(30.0));
-        let near = shot.frame.viewport.z;
-        let front = shot.floats(Id::BodyDepthRaw, 0).unwrap();
+        let near = shot.frame.near;
+        let front = shot.floats("body depth (ray-cast)", 0).unwrap();
         let inside = front.iter().filter(|d| **d == -near).count();
         assert!(inside > 200 && front.iter().filter(|d| **d > 0.0).count() > 1000, "{}: {inside}", driver.name);
         let shot = check(driver, &around, "around the camera", tolerance(30.0));
-        assert!(shot.floats(Id::BodyDepthRaw, 0).unwrap().iter().all(|d| *d == -near), "{}", driver.name);
+        assert!(shot.floats("body depth (ray-cast)", 0).unwrap().iter().all(|d| *d == -near), "{}", driver.name);
     });
 }
 
@@ -315,21 +315,21 @@ fn a_frame_does_without_what_it_does_not_need() {
     let behind = Particles { radius: 0.1, ellipsoids: vec![sphere(Vec3::new(0.0, 0.0, 3.0), 0.1)], splash_count: 1 };
     each_driver(|driver| {
         let mut one = case(cloud(3, 20), camera, size);
-        one.settings.refractions = 1;
+        one.settings = one.settings.refractions(1);
         let shot = driver.shoot(&one);
         for (depth, normal) in TARGETS {
             assert!(shot.words(depth, 0).is_some() && shot.words(depth, 1).is_none(), "{}", driver.name);
             assert!(shot.words(normal, 0).is_some() && shot.words(normal, 1).is_none(), "{}", driver.name);
         }
         let shot = driver.shoot(&case(cloud(0, 20), camera, size));
-        assert!(shot.words(Id::SplashDepth, 0).is_none() && shot.words(Id::SplashNormal, 0).is_none());
+        assert!(shot.words("splash depth", 0).is_none() && shot.words("splash normal", 0).is_none());
         let shot = driver.shoot(&case(cloud(3, 0), camera, size));
-        assert!(shot.words(Id::BodyDepthRaw, 0).is_none() && shot.words(Id::Bounds, 0).is_none());
+        assert!(shot.words("body depth (ray-cast)", 0).is_none() && shot.words("body depth bounds", 0).is_none());
 
         let empty = driver.shoot(&case(cloud(0, 0), camera, size));
-        assert!(empty.words(Id::Visible, 0).is_none() && empty.words(Id::SplashDepth, 0).is_none());
+        assert!(empty.words("visible particles", 0).is_none() && empty.words("splash depth", 0).is_none());
         let unseen = driver.shoot(&case(behind.clone(), camera, size));
-        assert!(unseen.words(Id::SplashDepth, 0).unwrap().iter().all(|d| *d == 0), "{}", driver.name);
+        assert!(unseen.words("splash depth", 0).unwrap().iter().all(|d| *d == 0), "{}", driver.name);
         assert_eq!(empty.picture, unseen.picture, "{}", driver.name);
         // The camera looks along -z, level: what it sees straight ahead is the map's horizon there.
         let sky = Equirect::procedural_sky();
@@ -365,7 +365,7 @@ fn a_centre_in_the_eye_plane_does_not_vanish() {
         eye_inside: false,
     };
     each_driver(|driver| {
-        let back = driver.shoot(&case).depths(Id::SplashDepth, 1).expect("a splash");
+        let back = driver.shoot(&case).depths("splash depth", 1).expect("a splash");
         assert!(back.iter().all(|d| *d > 0.0 && *d < 1.5), "{}", driver.name);
     });
 }

@@ -4,10 +4,12 @@ use glam::{Mat3, Vec3};
 use meniscus::{
     Background, Camera, Ellipsoid, Equirect, FrameInput, Particles, SceneInput, Settings,
     host::{Gpu, Instance, Session, Upload},
+    inspect::{self, Inspection, Walk},
+    optics::{Optics, four::Four, one::One, two::Two},
     prepare::{self, DevicePositions},
     shader::Frame,
+    smooth::{Smooth, plane_fit::PlaneFit},
     space::Space,
-    targets::Id,
 };
 use std::{cell::RefCell, collections::HashMap};
 
@@ -44,28 +46,28 @@ pub struct Shot {
     pub space: Space,
     pub size: [u32; 2],
     pub picture: Vec<[f32; 3]>,
-    targets: HashMap<(Id, u32), Vec<u32>>,
+    targets: HashMap<(&'static str, u32), Vec<u32>>,
 }
 
 impl Shot {
     /// Raw words of one layer of a target or of a buffer; `None` if the frame did without it.
-    pub fn words(&self, id: Id, layer: u32) -> Option<&[u32]> {
-        self.targets.get(&(id, layer)).map(Vec::as_slice)
+    pub fn words(&self, name: &'static str, layer: u32) -> Option<&[u32]> {
+        self.targets.get(&(name, layer)).map(Vec::as_slice)
     }
 
     /// The same as floats.
-    pub fn floats(&self, id: Id, layer: u32) -> Option<Vec<f32>> {
-        self.words(id, layer).map(|w| w.iter().map(|w| f32::from_bits(*w)).collect())
+    pub fn floats(&self, name: &'static str, layer: u32) -> Option<Vec<f32>> {
+        self.words(name, layer).map(|w| w.iter().map(|w| f32::from_bits(*w)).collect())
     }
 
     /// A target of depths, in world units.
-    pub fn depths(&self, id: Id, layer: u32) -> Option<Vec<f32>> {
+    pub fn depths(&self, name: &'static str, layer: u32) -> Option<Vec<f32>> {
         let world = |d: &u32| f32::from_bits(*d) * self.space.radius as f32;
-        self.words(id, layer).map(|w| w.iter().map(world).collect())
+        self.words(name, layer).map(|w| w.iter().map(world).collect())
     }
 
     pub fn counter(&self, slot: u32) -> u32 {
-        self.words(Id::Counters, 0).expect("there were particles")[slot as usize]
+        self.words("counters", 0).expect("there were particles")[slot as usize]
     }
 }
 
@@ -103,26 +105,23 @@ impl<'a> Driver<'a> {
         }
         let gpu = self.session.borrow().gpu;
         let upload = Upload::new(gpu, bytemuck::cast_slice(&words)).expect("upload");
-        let positions = DevicePositions {
-            buffer: upload.buffer,
-            offset: cloud.offset as u64,
-            stride: cloud.stride as u64,
-            count: cloud.positions.len() as u32,
-            radius: case.particles.radius,
-            options: cloud.options,
-            keep_class_below: cloud.keep_class_below,
-        };
-        self.shoot_input(case, &|input| FrameInput { positions: Some(positions), neighbours, ..input })
+        let count = cloud.positions.len() as u32;
+        let positions = DevicePositions::packed(upload.buffer, count, case.particles.radius)
+            .laid_out(cloud.offset as u64, cloud.stride as u64)
+            .options(cloud.options)
+            .keep_class_below(cloud.keep_class_below);
+        self.session.borrow_mut().renderer.inspect(Inspection { walks: true, neighbours });
+        self.shoot_input(case, &|input| input.positions(positions))
     }
 
     /// The same before a scene of the host's.
     pub fn shoot_before(&self, case: &Case, scene: SceneInput, background: Background) -> Shot {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
-        let mut shot = self.shoot_input(case, &|input| FrameInput { scene: Some(scene), background, ..input });
+        let mut shot = self.shoot_input(case, &|input| input.scene(scene).background(background));
         let p = case.camera.projection;
-        shot.frame.scene.x = p.z_axis.z;
-        shot.frame.scene.y = p.w_axis.z / shot.space.radius as f32;
-        shot.frame.scene.z = scene.cleared_depth;
+        shot.frame.scene_z_scale = p.z_axis.z;
+        shot.frame.scene_z_offset = p.w_axis.z / shot.space.radius as f32;
+        shot.frame.scene_cleared = scene.cleared_depth;
         shot
     }
 
@@ -134,28 +133,25 @@ impl<'a> Driver<'a> {
     fn shoot_input(&self, case: &Case, change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>) -> Shot {
         let session = &mut *self.session.borrow_mut();
         session.resize(case.size).expect("size");
-        let input = FrameInput {
-            eye_inside: case.eye_inside,
-            debug: true,
-            ..FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null())
-        };
+        let input = FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null());
+        let input = input.eye_inside(case.eye_inside);
         session.frame(&change(input)).expect("frame");
         let mut targets = HashMap::new();
-        for id in Id::OWN.into_iter().filter(|id| *id != Id::SplatDepth) {
+        for name in session.renderer.targets() {
             for layer in 0..2 {
-                if let Some(words) = session.words(id, layer).expect("read back") {
-                    targets.insert((id, layer), words);
+                if let Some(words) = session.words(name, layer).expect("read back") {
+                    targets.insert((name, layer), words);
                 }
             }
         }
         let picture = session.picture().expect("picture");
         let bounds = case.particles.bounds().unwrap_or_default();
-        let space = match targets.get(&(Id::Extent, 0)) {
+        let space = match targets.get(&("extent", 0)) {
             Some(extent) => Space::prepared(case.particles.radius, extent),
             None => Space::of(&case.particles),
         };
-        let mut frame = case.camera.uniforms(&case.settings, case.size, &space, bounds);
-        frame.scene.w = f32::from(case.eye_inside);
+        let mut frame = inspect::uniforms(&case.camera, &case.settings, case.size, &space, bounds);
+        frame.eye_inside = f32::from(case.eye_inside);
         Shot { frame, space, size: case.size, picture, targets }
     }
 }
@@ -180,13 +176,85 @@ pub fn each_driver(test: impl Fn(&Driver)) {
         // What the inner scope does not destroy is among the messages.
         {
             let gpu = Gpu::new(&instance, found).expect("device");
-            let session = Session::new(&gpu, [1, 1], &Equirect::procedural_sky()).expect("session");
+            let mut session = Session::new(&gpu, [1, 1], &Equirect::procedural_sky()).expect("session");
+            session.renderer.inspect(Inspection { walks: true, neighbours: 0 });
             let driver = Driver { instance: &instance, session: RefCell::new(session), name: name.clone() };
             test(&driver);
             driver.session.into_inner().end();
         }
         let messages = instance.messages();
         assert!(messages.is_empty(), "{name}: validation:\n{}", messages.join("\n"));
+    }
+}
+
+/// Settings by what tests change of them.
+pub trait Choose {
+    /// Light that bends at up to 1, 2 or 4 surfaces, and is reflected inside so often.
+    fn refractions(&self, count: u32) -> Settings;
+    fn reflections(&self, count: u32) -> Settings;
+    fn iterations(&self, count: u32) -> Settings;
+    fn absorption(&self, absorption: Vec3) -> Settings;
+    fn quads_only(&self, quads: bool) -> Settings;
+    fn occlusion_culling(&self, culling: bool) -> Settings;
+    /// What the optics are told.
+    fn walk(&self) -> Walk;
+    /// What the smoothing is told.
+    fn fit(&self) -> PlaneFit;
+}
+
+/// The same settings with something else in them.
+fn with(settings: &Settings, change: impl FnOnce(&mut Settings)) -> Settings {
+    let mut settings = *settings;
+    change(&mut settings);
+    settings
+}
+
+impl Choose for Settings {
+    fn refractions(&self, count: u32) -> Settings {
+        let walk = self.walk();
+        let optics = match count {
+            4 => Four::default().internal_reflections(walk.internal_reflections).fresnel(walk.fresnel).into(),
+            2 => Two::default().internal_reflections(walk.internal_reflections).fresnel(walk.fresnel).into(),
+            _ => One::default().fresnel(walk.fresnel).into(),
+        };
+        with(self, |s| s.method.optics = optics)
+    }
+
+    fn reflections(&self, count: u32) -> Settings {
+        let change = |optics: &mut Optics| match optics {
+            Optics::Four(p) => p.internal_reflections = count,
+            Optics::Two(p) => p.internal_reflections = count,
+            _ => {}
+        };
+        with(self, |s| change(&mut s.method.optics))
+    }
+
+    fn iterations(&self, count: u32) -> Settings {
+        let smooth = self.fit().iterations(count).into();
+        with(self, |s| s.method.smooth = smooth)
+    }
+
+    fn absorption(&self, absorption: Vec3) -> Settings {
+        with(self, |s| s.liquid.absorption = absorption)
+    }
+
+    fn quads_only(&self, quads: bool) -> Settings {
+        with(self, |s| s.drawing.quads_only = quads)
+    }
+
+    fn occlusion_culling(&self, culling: bool) -> Settings {
+        with(self, |s| s.drawing.occlusion_culling = culling)
+    }
+
+    fn walk(&self) -> Walk {
+        Walk::of(&self.method.optics).expect("optics that walk")
+    }
+
+    fn fit(&self) -> PlaneFit {
+        match self.method.smooth {
+            Smooth::PlaneFit(p) => p,
+            _ => PlaneFit::default(),
+        }
     }
 }
 

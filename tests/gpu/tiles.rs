@@ -1,8 +1,8 @@
 //! Tiles: the ranges of front depths equal the twin's, bit for bit.
 
-use crate::support::{Case, camera, each_driver, random_cloud};
+use crate::support::{Case, Choose, camera, each_driver, random_cloud};
 use glam::Vec3;
-use meniscus::{Settings, shader::FRONT_TILE, targets::Id, twin::tiles::tiles};
+use meniscus::{Settings, shader::FRONT_TILE, twin::tiles::tiles};
 
 #[test]
 fn ranges_equal_the_twin() {
@@ -18,10 +18,12 @@ fn ranges_equal_the_twin() {
         };
         each_driver(|driver| {
             let shot = driver.shoot(&case);
-            let maps: Vec<_> = [Id::SplashDepth, Id::BodyDepthB].iter().filter_map(|id| shot.floats(*id, 0)).collect();
+            let maps: Vec<_> =
+                ["splash depth", "body depth (smoothed, even)"].iter().filter_map(|id| shot.floats(*id, 0)).collect();
             let maps: Vec<_> = maps.iter().map(Vec::as_slice).collect();
             let expected = tiles(size, &maps);
-            let (low, high) = (shot.floats(Id::FrontTiles, 0).unwrap(), shot.floats(Id::FrontTiles, 1).unwrap());
+            let (low, high) =
+                (shot.floats("front depth tiles", 0).unwrap(), shot.floats("front depth tiles", 1).unwrap());
             assert_eq!(low.len() as u32, size[0].div_ceil(FRONT_TILE) * size[1].div_ceil(FRONT_TILE));
             let found: Vec<_> = low.into_iter().zip(high).collect();
             assert_eq!(found, expected, "{}: {size:?}", driver.name);
@@ -40,7 +42,7 @@ fn fewer_than_four_refractions_do_without() {
         eye_inside: false,
     };
     for refractions in [1, 2] {
-        case.settings.refractions = refractions;
-        each_driver(|driver| assert!(driver.shoot(&case).words(Id::FrontTiles, 0).is_none(), "{}", driver.name));
+        case.settings = case.settings.refractions(refractions);
+        each_driver(|driver| assert!(driver.shoot(&case).words("front depth tiles", 0).is_none(), "{}", driver.name));
     }
 }

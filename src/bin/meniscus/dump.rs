@@ -4,14 +4,14 @@ use crate::{choices, codes, options, outputs::Dump, render::Job};
 use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     host::Session,
-    inspect::Walk,
+    inspect::{self, Walk},
     shader::{SIDE_BACK, SIDE_FRONT},
     smooth::Smooth,
     space::Space,
     twin::normal::decode_normal,
 };
 use npyz::WriterBuilder;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::{collections::BTreeMap, error::Error, path::Path};
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
@@ -139,14 +139,22 @@ fn world_view(view: Mat4, origin: DVec3) -> DMat4 {
 }
 
 /// All that is needed to recompute the dump.
-pub fn frame(job: &Job) -> serde_json::Value {
+pub fn frame(job: &Job) -> Value {
     let (s, radius) = (&job.settings, job.scene.particles.radius);
     let codes =
         |table: &[(u32, &'static str)]| table.iter().map(|(c, t)| (c.to_string(), *t)).collect::<BTreeMap<_, _>>();
     let bounds = job.scene.particles.bounds().unwrap_or_default();
     // In radii, whatever the origin.
-    let uniforms = job.camera.uniforms(s, job.size, &Space::new(radius, Vec3::ZERO), bounds);
-    let search = radius * uniforms.search;
+    let block = inspect::uniforms(&job.camera, s, job.size, &Space::new(radius, Vec3::ZERO), bounds);
+    let tolerance = meniscus::twin::search::Tolerance::of(&block);
+    let guards = match s.method.smooth {
+        Smooth::PlaneFit(p) => json!({
+            "grazing": meniscus::shader::FIT_GRAZING_LIMIT,
+            "update": meniscus::shader::FIT_UPDATE_LIMIT * p.sigma * radius,
+            "meaning": "the old depth is kept where |n.v| (v unit) is below `grazing` or the update exceeds `update`",
+        }),
+        _ => Value::Null,
+    };
     let walk = Walk::of(&s.method.optics);
     let mut frame = json!({
         "width": job.size[0],
@@ -162,15 +170,11 @@ pub fn frame(job: &Job) -> serde_json::Value {
         "settings": choices::record(s),
         "units": choices::units(s),
         "asked": job.picture.record(),
-        "plane_fit_guards": matches!(s.method.smooth, Smooth::PlaneFit(_)).then(|| json!({
-            "grazing": uniforms.smoothing.z,
-            "update": uniforms.smoothing.y * radius,
-            "meaning": "the old depth is kept where |n.v| (v unit) is below `grazing` or the update exceeds `update`",
-        })),
+        "plane_fit_guards": guards,
         "refractions": walk.map(|w| w.refractions),
         "sampling": {
-            "jump": search.z,
-            "accepted": search.y,
+            "jump": radius * tolerance.jump,
+            "accepted": radius * tolerance.accepted,
             "meaning": "maps are sampled bilinearly, normals with them, where all four pixels have a surface whose depths \
                         spread by at most `jump`, else at the nearest pixel; a hit has |f| of at most `accepted`",
         },

@@ -188,7 +188,7 @@ impl Picture {
     /// Beside particles and settings: what was asked of radius, camera, environment and the like.
     pub fn record_rest(&self) -> Map<String, Value> {
         let Value::Object(mut all) = self.record() else { return Map::new() };
-        ["particles", "settings"].map(|key| all.remove(key));
+        all.retain(|key, _| !["particles", "settings"].contains(&key.as_str()));
         all
     }
 }

@@ -153,8 +153,9 @@ impl Scene {
 
     /// What [`Scene::give`] uploaded.
     pub fn on_device(&self, upload: &Upload) -> DevicePositions {
-        let packed = DevicePositions::packed(upload.buffer, self.positions.len() as u32, self.particles.radius);
-        DevicePositions { options: self.options, ..packed }
+        let mut all = DevicePositions::packed(upload.buffer, self.positions.len() as u32, self.particles.radius);
+        all.options = self.options;
+        all
     }
 
     /// Whether a point (relative to the origin) is inside the body: half as dense as a filled body.

@@ -1,0 +1,52 @@
+//! One surface, the nearest, and how much liquid lies behind it: what screen-space fluid rendering keeps (Cords08,
+//! Green10).
+
+use super::{
+    Body, Layered, Layering,
+    splat::{classes, particles, surface},
+    split::BODY,
+};
+use crate::{
+    frame::Scene,
+    method::Offers,
+    parameters::parameters,
+    passes::Drawn,
+    plan::{Blend, Call, External, Plan, Rendering},
+    shader::{SIDE_FRONT, THICKNESS_FRAG},
+};
+use ash::vk::Format;
+
+parameters! {
+    /// The nearest surface of all particles, and where the optics ask for it the thickness of all behind it (Green10).
+    pub struct Front {}
+}
+
+impl Layering for Front {
+    fn offers(&self) -> Offers {
+        Offers { backs: false, normals: true, thickness: true }
+    }
+
+    fn may_cull(&self, scene: &Scene) -> bool {
+        // What is hidden counts for the thickness.
+        !scene.asks().thickness
+    }
+
+    fn record(&self, plan: &mut Plan, scene: &Scene, drawn: &Drawn) -> Layered {
+        let all: Vec<u32> = classes(scene).collect();
+        let body = surface(plan, scene, drawn, &all, 1, &BODY);
+        let thickness = scene.asks().thickness.then(|| {
+            let thickness = plan.flat("thickness", Format::R32_SFLOAT);
+            let rendering = Rendering::into(thickness, 0).blending(Blend::Add, [0.0; 4]);
+            let fragment = &THICKNESS_FRAG[usize::from(scene.has_scene)];
+            let mut draws: Vec<(Call, _)> =
+                all.iter().flat_map(|class| particles(scene, drawn, fragment, *class, SIDE_FRONT)).collect();
+            if scene.has_scene {
+                let depth = plan.given(External::SceneDepth);
+                draws = draws.into_iter().map(|(call, v)| (call.read("scene_depth", depth), v)).collect();
+            }
+            plan.render("thickness", rendering, draws);
+            thickness
+        });
+        Layered { splash: None, body: Some(Body::from(body)), thickness }
+    }
+}
