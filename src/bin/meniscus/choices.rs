@@ -83,9 +83,12 @@ impl Flag {
         let arg = Arg::new(kebab(name)).long(kebab(name)).help(self.help());
         let arg = arg.help_heading(format!("Parameters of {}", self.part));
         let arg = arg.value_name(if vector { "X,Y,Z" } else { "N" });
-        let mut choices: Vec<_> = self.of.iter().flat_map(|(_, p)| p.choices).copied().collect();
-        choices.sort_unstable();
-        choices.dedup();
+        let mut choices: Vec<&str> = Vec::new();
+        for choice in self.of.iter().flat_map(|(_, p)| p.choices) {
+            if !choices.contains(choice) {
+                choices.push(choice);
+            }
+        }
         let any = self.of.iter().any(|(_, p)| p.choices.is_empty());
         match any {
             // What begins with a minus is a value too, in a vector as well.

@@ -25,21 +25,26 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
         ("body", "", surfaces.body_depth, surfaces.body_normal),
     ];
     for (class, raw, depth, normal) in targets {
-        let (Some(depth), Some(normal)) = (depth, normal) else { continue };
         for (side, layer) in [("front", SIDE_FRONT), ("back", SIDE_BACK)] {
-            let (Some(depths), Some(normals)) = (session.words(depth, layer)?, session.words(normal, layer)?) else {
-                continue;
-            };
-            out.maps(&format!("{class}_{side}"), raw, &depths, &normals)?;
+            let mut words = |name: Option<&'static str>| name.map_or(Ok(None), |name| session.words(name, layer));
+            let (Some(depths), normals) = (words(depth)?, words(normal)?) else { continue };
+            out.maps(&format!("{class}_{side}"), raw, &depths, normals.as_deref())?;
         }
     }
-    let walk = floats(session.words("walk (debug)", 0)?);
-    for (k, name) in ["pattern", "outcome", "hits", "path_length"].into_iter().enumerate() {
-        let unit = if name == "path_length" { out.radius } else { 1.0 };
-        out.array(name, 1, walk.chunks_exact(4).map(|w| w[k] * unit))?;
+    if let Some(words) = session.words("thickness", 0)? {
+        out.array("thickness", 1, words.into_iter().map(|w| f32::from_bits(w) * out.radius))?;
     }
-    let direction = floats(session.words("final direction (debug)", 0)?);
-    out.array("final_direction", 3, direction.chunks_exact(4).flat_map(|d| [d[0], d[1], d[2]]))?;
+    // Not all optics walk.
+    if let Some(words) = session.words("walk (debug)", 0)? {
+        let walk = floats(words);
+        for (k, name) in ["pattern", "outcome", "hits", "path_length"].into_iter().enumerate() {
+            let unit = if name == "path_length" { out.radius } else { 1.0 };
+            out.array(name, 1, walk.chunks_exact(4).map(|w| w[k] * unit))?;
+        }
+    }
+    if let Some(words) = session.words("final direction (debug)", 0)? {
+        out.array("final_direction", 3, floats(words).chunks_exact(4).flat_map(|d| [d[0], d[1], d[2]]))?;
+    }
     out.array("color_linear", 3, session.picture()?.into_iter().flatten())?;
     out.dump.write("particles.npz", &particles(job)?)?;
     if job.args.dump_neighbours {
@@ -49,8 +54,8 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     Ok(out.dump.finish()?)
 }
 
-fn floats(words: Option<Vec<u32>>) -> Vec<f32> {
-    words.unwrap_or_default().into_iter().map(f32::from_bits).collect()
+fn floats(words: Vec<u32>) -> Vec<f32> {
+    words.into_iter().map(f32::from_bits).collect()
 }
 
 struct Folder<'a> {
@@ -68,9 +73,10 @@ impl Folder<'_> {
         Ok(self.dump.write(&format!("{name}.npy"), &npy(shape, data)?)?)
     }
 
-    fn maps(&self, surface: &str, raw: &str, depths: &[u32], normals: &[u32]) -> Result<()> {
+    fn maps(&self, surface: &str, raw: &str, depths: &[u32], normals: Option<&[u32]>) -> Result<()> {
         let depth = |w: &u32| Some(self.radius * f32::from_bits(*w)).filter(|d| *d > 0.0);
         self.array(&format!("{surface}_depth{raw}"), 1, depths.iter().map(|w| depth(w).unwrap_or(f32::NAN)))?;
+        let Some(normals) = normals else { return Ok(()) };
         let normal = depths.iter().zip(normals).flat_map(|(d, n)| match depth(d) {
             Some(_) => decode_normal(*n).to_array(),
             None => [f32::NAN; 3],
