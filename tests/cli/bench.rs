@@ -71,7 +71,7 @@ fn bench_has_the_options_that_decide_a_picture() {
     for (name, value) in numbers {
         assert_eq!(run["settings"][name].as_f64(), Some(value), "{name}");
     }
-    assert_eq!(run["settings"]["absorption"], serde_json::json!([1.0, 2.0, 3.0]));
+    assert_eq!(run["settings"]["absorption"], serde_json::json!([1, 2, 3]));
     assert_eq!((&run["settings"]["fresnel"], &run["settings"]["weighting"]), (&"exact".into(), &"euclidean".into()));
     assert_eq!(run["settings"]["occlusion_culling"], false);
     assert_eq!((&run["settings"]["optics"], &run["units"]["sigma"]), (&"two".into(), &"particle radii".into()));

@@ -107,3 +107,15 @@ fn help(mut said: clap::Error) -> Result<ExitCode, Box<dyn Error>> {
     }
     Ok(ExitCode::from(if wrong { 2 } else { 0 }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Cli;
+    use clap::CommandFactory;
+
+    /// Flags that follow from the library's parameters have names of their own.
+    #[test]
+    fn no_two_options_have_one_name() {
+        Cli::command().debug_assert();
+    }
+}
