@@ -48,4 +48,36 @@ if [ -f "$layer" ] && [ -f "$manifest" ]; then
   mkdir -p target/layers
   sed "s#\"library_path\": *\"[^\"]*\"#\"library_path\": \"$layer\"#" "$manifest" > target/layers/VkLayer_khronos_validation.json
 fi
+# A third Vulkan driver: Mesa 25's lavapipe, from Debian 12's backports. It is not installed, only unpacked, and it finds what
+# it links with among Debian's own libraries; setup goes on without it wherever it cannot be had.
+mesa=target/mesa25
+unpack_mesa() {
+  grep -q '^VERSION_CODENAME=bookworm$' /etc/os-release || { echo "this is not Debian 12"; return 1; }
+  rm -rf "$mesa" && mkdir -p "$mesa"/{lists,cache,debs,root} && cd "$mesa" || return 1
+  local here=$PWD suite
+  for suite in bookworm bookworm-backports; do
+    echo "deb [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] http://deb.debian.org/debian $suite main"
+  done > sources.list
+  # Lists and downloads of its own, so that nothing of the system's is written and no root is needed.
+  local apt=(apt-get -qq -o "Dir::Etc::SourceList=$here/sources.list" -o Dir::Etc::SourceParts=- -o "Dir::State::Lists=$here/lists"
+             -o "Dir::Cache=$here/cache" -o APT::Sandbox::User= -o Acquire::Retries=1 -o Acquire::http::Timeout=20
+             -o Acquire::Languages=none -o APT::Update::Error-Mode=any)
+  "${apt[@]}" update || return 1
+  local package=mesa-vulkan-drivers/bookworm-backports
+  (cd debs && "${apt[@]}" download "$package") && dpkg-deb -x debs/mesa-vulkan-drivers_*.deb root || return 1
+  local library=$here/libvulkan_lvp.so
+  find root -name libvulkan_lvp.so -exec mv -t . {} + && [ -f "$library" ] || { echo "the package has no lavapipe"; return 1; }
+  # The loader would complain in every run of a driver that links with newer libraries than are here.
+  ! ldd -r "$library" 2>&1 | grep -E 'not found|undefined symbol' || return 1
+  # Last: where the manifest is there, all is.
+  sed "s#\"library_path\": *\"[^\"]*\"#\"library_path\": \"$library\"#" root/usr/share/vulkan/icd.d/lvp_icd*.json > manifest.new
+  rm -rf lists cache debs root sources.list && grep -qF "\"$library\"" manifest.new && mv manifest.new lvp_icd.json
+}
+# The manifest has an absolute path: a checkout that was moved unpacks anew. What failed once is not tried again.
+if ! grep -qsF "\"$PWD/$mesa/" "$mesa/lvp_icd.json" && [ ! -e target/no-mesa25 ]; then
+  if ! why=$(unpack_mesa 2>&1); then
+    rm -rf "$mesa" && touch target/no-mesa25
+    echo "setup: no third driver, Mesa 25 of Debian's backports (${why##*$'\n'}); remove target/no-mesa25 to try again" >&2
+  fi
+fi
 echo "setup: done"

@@ -26,21 +26,13 @@ layout(set = 0, binding = 2) uniform utexture2DArray body_normal;
 layout(set = 0, binding = 3) uniform texture2DArray splash_depth;
 layout(set = 0, binding = 4) uniform utexture2DArray splash_normal;
 layout(set = 0, binding = 5) uniform texture2DArray front_tiles; // smallest, largest front depth
-#ifdef CUBE
-layout(set = 0, binding = 6) uniform textureCube environment; // linear
-layout(set = 0, binding = 7) uniform sampler environment_sampler; // nearest
-#else
-layout(set = 0, binding = 6) uniform texture2D environment; // equirectangular, linear
-#endif
-#ifdef SCENE
-layout(set = 0, binding = 8) uniform texture2D scene_color; // the host's opaque scene, linear
-layout(set = 0, binding = 9) uniform texture2D scene_depth; // its depth buffer
-#endif
 layout(location = 0) out vec4 out_color;
 #ifdef DEBUG
 layout(location = 1) out vec4 out_walk;      // pattern, outcome, hits, length inside
 layout(location = 2) out vec4 out_direction; // world space; w: surfaces whose normal faced the wrong way
 #endif
+#include "environment.glsl"
+#include "scene.glsl"
 #include "search.glsl"
 #include "background.glsl"
 

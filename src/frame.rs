@@ -12,6 +12,7 @@ use crate::{
     shader, smooth,
 };
 use ash::vk;
+use glam::Mat4;
 
 /// The passes of one frame. What a scene does not need is not there: no splash particles, no splash maps; one refraction,
 /// no back maps; no particles at all, only the background.
@@ -76,6 +77,8 @@ pub(crate) struct Scene<'a> {
     pub environment: EnvironmentShape,
     pub background: Background,
     pub output: vk::Format,
+    /// World to eye.
+    pub eye: Mat4,
     /// Whether what each walk met is written too.
     pub walks: bool,
     /// Whether the device has points larger than a pixel.
@@ -110,6 +113,7 @@ impl<'a> Scene<'a> {
             environment: EnvironmentShape::Equirect,
             background: Background::Environment,
             output: vk::Format::R32G32B32A32_SFLOAT,
+            eye: Mat4::IDENTITY,
             walks: false,
             points: limits.point_size > 1.0,
             storage_size: limits.storage_size,

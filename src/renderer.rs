@@ -287,7 +287,7 @@ impl Renderer {
         let mut positions = (vk::Buffer::null(), 0, 0);
         let mut scene = Scene::new(input.settings, self.size, [self.scene.splash, self.scene.body], &self.limits);
         (scene.output, scene.background, scene.environment) = (self.output, input.background, environment.shape);
-        scene.has_scene = input.scene.is_some();
+        (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
         if let Some(p) = &input.positions {
             self.fill(&mut scene, Amount::OnDevice(p))?;
             // The device finds the box; what is written here never shows.
@@ -446,7 +446,7 @@ fn check_memory(host: &Host, limits: &Limits, tables: &[Table; 2], plan: &Plan) 
 }
 
 /// Each once.
-fn unique<'a>(recipes: Vec<&'a Recipe>) -> Vec<&'a Recipe> {
+fn unique(recipes: Vec<&Recipe>) -> Vec<&Recipe> {
     let mut seen = HashSet::new();
     recipes.into_iter().filter(|r| seen.insert(*r)).collect()
 }

@@ -60,8 +60,8 @@ impl Settings {
     pub fn parts() -> Vec<Part> {
         let group = |name, one: Box<dyn Parameters>| Part { name, about: "", members: vec![("", one)] };
         let mut parts = Method::families();
-        parts.push(group("liquid", Box::new(Liquid::default())));
-        parts.push(group("drawing", Box::new(Drawing::default())));
+        parts.push(group("liquid", Box::<Liquid>::default()));
+        parts.push(group("drawing", Box::<Drawing>::default()));
         parts
     }
 

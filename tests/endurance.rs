@@ -95,7 +95,7 @@ fn memory_and_time_stay_flat() {
     for device in usable {
         // Without validation, which keeps books of its own.
         let instance = Instance::new(false).expect("instance");
-        let gpu = Gpu::new(&instance, instance.pick(Some(&device.name)).expect("it was there")).expect("device");
+        let gpu = Gpu::new(&instance, instance.pick(Some(&device.label())).expect("it was there")).expect("device");
         for kind in &KINDS {
             let label = format!("{}: {}", device.driver, kind.name);
             let Endured { process, held, slowest, pass } = run(&gpu, kind);

@@ -109,6 +109,18 @@ pub struct DeviceInfo {
     family: u32,
 }
 
+impl DeviceInfo {
+    /// Name and driver. Two versions of one driver may name a device alike: this tells them apart.
+    pub fn label(&self) -> String {
+        format!("{}, {}", self.name, self.driver)
+    }
+
+    /// Whether [`DeviceInfo::label`] contains `wanted` (case does not matter).
+    pub fn is_called(&self, wanted: &str) -> bool {
+        self.label().to_lowercase().contains(&wanted.to_lowercase())
+    }
+}
+
 /// An instance, with or without validation.
 pub struct Instance {
     _entry: ash::Entry,
@@ -180,6 +192,11 @@ impl Instance {
     /// Validation messages so far, oldest first; empty without validation.
     pub fn messages(&self) -> Vec<String> {
         self.messages.as_deref().map(Messages::all).unwrap_or_default()
+    }
+
+    /// The same, and forgets them.
+    pub fn take_messages(&self) -> Vec<String> {
+        self.messages.as_deref().map(Messages::take).unwrap_or_default()
     }
 
     /// Every device, best first.
@@ -260,16 +277,13 @@ impl Instance {
         tools.iter().filter(|t| t.purposes.intersects(spoils)).map(named).collect()
     }
 
-    /// The best device, or the first whose name or driver contains `wanted` (case does not matter).
+    /// The best device, or the first that [is called](DeviceInfo::is_called) `wanted`.
     pub fn pick(&self, wanted: Option<&str>) -> Result<DeviceInfo, HostError> {
         let devices = self.devices()?;
-        let fits = |d: &&DeviceInfo| {
-            let all = format!("{} {}", d.name, d.driver).to_lowercase();
-            d.refusal.is_none() && wanted.is_none_or(|w| all.contains(&w.to_lowercase()))
-        };
+        let fits = |d: &&DeviceInfo| d.refusal.is_none() && wanted.is_none_or(|w| d.is_called(w));
         let found = || match devices
             .iter()
-            .map(|d| d.refusal.clone().unwrap_or_else(|| d.name.clone()))
+            .map(|d| d.refusal.clone().unwrap_or_else(|| d.label()))
             .collect::<Vec<_>>()
             .join("; ")
         {

@@ -1,7 +1,11 @@
 //! How light goes through the liquid's surfaces.
 
 pub mod four;
+pub mod instant_liquids;
+pub(crate) mod lookup;
 pub mod one;
+pub mod ssfr;
+pub mod ssfr_index;
 mod tiles;
 pub mod two;
 pub(crate) mod walk;
@@ -20,6 +24,9 @@ family! {
         Four(four) = "four",
         Two(two) = "two",
         One(one) = "one",
+        Ssfr(ssfr) = "ssfr",
+        SsfrIndex(ssfr_index) = "ssfr-index",
+        InstantLiquids(instant_liquids) = "instant-liquids",
     }
 }
 

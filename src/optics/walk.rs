@@ -29,6 +29,7 @@ impl Walk {
             Optics::Four(p) => Some(p.into()),
             Optics::Two(p) => Some(p.into()),
             Optics::One(p) => Some(p.into()),
+            _ => None,
         }
     }
 
@@ -75,7 +76,7 @@ impl Walk {
 }
 
 /// Maps that nothing looks at.
-fn placeholder(plan: &mut Plan) -> Surface {
+pub(super) fn placeholder(plan: &mut Plan) -> Surface {
     let mut one = |name, format| -> Target {
         plan.image(name, ImageSpec { format, size: [1, 1], layers: 1, array: true, usage: Default::default() })
     };

@@ -1,5 +1,6 @@
 //! Twin of `glsl/extent.comp`: the box of all positions and the cells it occupies.
 
+use crate::space::power_of_two;
 use glam::Vec3;
 
 /// What the extent pass finds.
@@ -13,6 +14,41 @@ pub struct Extent {
     pub bits: [u32; 3],
     /// Positions that are not finite.
     pub lost: u32,
+}
+
+/// The box and the origin as the pass keeps them: coordinates times the power of two that brings the radius into 1..2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kept {
+    /// Smallest coordinates, as integers in the order of the floats; all bits set without any finite position.
+    pub least: [u32; 3],
+    /// Largest coordinates; 0 without any.
+    pub most: [u32; 3],
+    /// Where the liquid's own space has its origin: the middle one of the particles, or the middle of the box where that
+    /// one is not finite.
+    pub origin: [f32; 3],
+}
+
+/// An integer for each float, in the floats' own order.
+pub fn ordered(x: f32) -> u32 {
+    let bits = x.to_bits();
+    if x.is_sign_negative() { !bits } else { bits | 1 << 31 }
+}
+
+/// What the pass keeps of positions of particles with this radius.
+pub fn kept(positions: &[Vec3], radius: f32) -> Kept {
+    let scale = power_of_two(radius);
+    let scaled = || positions.iter().map(|p| *p * scale);
+    let mut kept = Kept { least: [u32::MAX; 3], most: [0; 3], origin: [0.0; 3] };
+    for p in scaled().filter(|p| p.is_finite()) {
+        for (axis, x) in p.to_array().into_iter().enumerate() {
+            kept.least[axis] = kept.least[axis].min(ordered(x));
+            kept.most[axis] = kept.most[axis].max(ordered(x));
+        }
+    }
+    let (low, high) = extent(positions, radius, 0).bounds;
+    let middle = scaled().nth(positions.len() / 2).filter(|p| p.is_finite());
+    kept.origin = middle.unwrap_or(0.5 * (low * scale) + 0.5 * (high * scale)).to_array();
+    kept
 }
 
 /// Beyond this many cells from the origin all is one cell.

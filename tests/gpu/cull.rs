@@ -8,7 +8,6 @@ use crate::{
 use glam::{Mat3, Vec3};
 use meniscus::{
     Camera, Ellipsoid, Particles,
-    host::Instance,
     prepare::{Input, Options, prepare},
     shader::{
         CLASS_BODY, CLASS_SPLASH, COUNT_SPLASH_FRONT, SIDE_BACK, SIDE_FRONT, VISIBLE_BACK, VISIBLE_BODY, VISIBLE_FRONT,
@@ -71,8 +70,7 @@ fn verdicts(shot: &Shot, particles: &Particles, class: u32) -> Vec<u32> {
 
 /// Largest point of a driver, in pixels.
 pub fn point_size(driver: &Driver) -> f64 {
-    let devices = Instance::new(false).and_then(|i| i.devices()).expect("a Vulkan loader");
-    f64::from(devices.iter().find(|d| d.name == driver.name).expect("it was there a moment ago").point_size)
+    f64::from(driver.gpu().info.point_size)
 }
 
 /// Compares with the twin on the GPU's own bounds, and with what every particle, drawn, would show.

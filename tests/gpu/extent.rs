@@ -4,14 +4,18 @@ use crate::support::{Cloud, each_driver};
 use glam::Vec3;
 use meniscus::{
     prepare::Search,
-    shader::{COUNT_NOT_FINITE, EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_PASSES},
-    twin::extent::extent,
+    shader::{
+        COUNT_NOT_FINITE, EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_LEAST, EXTENT_MOST, EXTENT_ORIGIN,
+        EXTENT_PASSES,
+    },
+    twin::extent::{Kept, extent, kept},
 };
 
 #[test]
 fn boxes_cells_and_bits_are_the_twins() {
     each_driver(|driver| {
-        for (name, radius, mut positions) in crate::shape::clouds() {
+        let lost_only = ("none finite", 0.05, vec![Vec3::NAN; 5]);
+        for (name, radius, mut positions) in crate::shape::clouds().into_iter().chain([lost_only]) {
             for lost in [0, 3] {
                 // Positions that are not finite count for nothing.
                 positions.extend([Vec3::NAN, Vec3::INFINITY, Vec3::new(0.0, f32::NEG_INFINITY, 0.0)].iter().take(lost));
@@ -20,7 +24,10 @@ fn boxes_cells_and_bits_are_the_twins() {
                     let shot = driver.shoot_cloud(&crate::shape::empty(radius), &Cloud::new(&positions, search));
                     let words = shot.words("extent", 0).expect("extent");
                     let three = |at: u32| <[u32; 3]>::try_from(&words[at as usize..][..3]).expect("three words");
+                    let origin = three(EXTENT_ORIGIN).map(f32::from_bits);
+                    let found = Kept { least: three(EXTENT_LEAST), most: three(EXTENT_MOST), origin };
                     let label = format!("{}: {name}: {search:?}, {lost} lost", driver.name);
+                    assert_eq!(found, kept(&positions, radius), "{label}");
                     let cells = (three(EXTENT_FIRST_CELL), three(EXTENT_LAST_CELL));
                     assert_eq!((cells.0.map(|c| c as i32), cells.1.map(|c| c as i32)), want.cells, "{label}");
                     assert_eq!(three(EXTENT_BITS), want.bits, "{label}");

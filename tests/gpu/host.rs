@@ -1,10 +1,11 @@
 //! The contract with the host: frames in flight, replaced resources, host scenes, output formats.
 
+use crate::drivers::SKY;
 use crate::support::{Case, Choose, Cloud, Driver, camera, each_driver, random_cloud, sphere};
 use ash::vk;
 use glam::Vec3;
 use meniscus::{
-    Equirect, Error, FrameInput, Particles, Renderer, SceneInput, Settings,
+    Error, FrameInput, Particles, Renderer, SceneInput, Settings,
     host::{Canvas, Gpu, HostError, Upload},
     prepare::{DevicePositions, Search},
     renderer::Amount,
@@ -36,7 +37,7 @@ pub fn with_renderer(driver: &Driver, format: vk::Format, frames: u32, body: imp
     let mut renderer = unsafe { Renderer::new(gpu.host(frames), format) }.expect("renderer");
     renderer.resize(SIZE).expect("size");
     // SAFETY: recorded outside rendering, before any frame.
-    gpu.run(|cmd| Ok(unsafe { renderer.set_environment(cmd, &Equirect::procedural_sky()) }?)).expect("environment");
+    gpu.run(|cmd| Ok(unsafe { renderer.set_environment(cmd, &SKY) }?)).expect("environment");
     body(&gpu, &mut renderer);
     // SAFETY: every command buffer was waited for.
     unsafe { renderer.destroy() };
@@ -51,8 +52,13 @@ pub fn input<'a>(case: &'a Case, slot: usize, output: vk::ImageView) -> FrameInp
 fn assert_shows(canvas: &Canvas, expected: &[[f32; 3]], what: &str) {
     let words = canvas.read().expect("picture");
     let float = |p: &[u8], o: usize| f32::from_ne_bytes([p[o], p[o + 1], p[o + 2], p[o + 3]]);
-    let found = words.chunks_exact(16).flat_map(|p| [0, 4, 8].map(|o| float(p, o)));
-    let differ = |(a, b): &(&f32, f32)| (*a - b).abs() > 1e-3 * a.abs().max(0.1);
+    let found: Vec<f32> = words.chunks_exact(16).flat_map(|p| [0, 4, 8].map(|o| float(p, o))).collect();
+    assert_same(&found, expected, what);
+}
+
+fn assert_same(found: &[f32], expected: &[[f32; 3]], what: &str) {
+    assert!(found.len() == expected.as_flattened().len() && found.iter().all(|v| v.is_finite()), "{what}");
+    let differ = |(a, b): &(&f32, &f32)| (*a - *b).abs() > 1e-3 * a.abs().max(0.1);
     let differ = expected.iter().flatten().zip(found).filter(differ).count();
     assert!(differ * 100 < 3 * expected.len(), "{what}: {differ} values differ");
 }
@@ -187,10 +193,10 @@ fn a_host_scene_is_hidden_seen_and_seen_through_the_liquid() {
             let output = canvas(vk::Format::R32G32B32A32_SFLOAT, 16);
             let color = canvas(vk::Format::R32G32B32A32_SFLOAT, 16);
             let depth = canvas(vk::Format::R32_SFLOAT, 4);
-            // A red wall at linear depth d: z = (P22 z_e + P23) / -z_e.
+            // A red wall at linear depth d: z = (P22 z_e + P23) / -z_e. The camera's z is 1 infinitely far away.
             let p = case.camera.projection;
-            let render = |renderer: &mut Renderer, d: f32| {
-                let z = (p.w_axis.z - p.z_axis.z * d) / d;
+            let at = |d: f32| (p.w_axis.z - p.z_axis.z * d) / d;
+            let render = |renderer: &mut Renderer, z: f32| {
                 gpu.run(|cmd| {
                     let general = vk::ImageLayout::GENERAL;
                     for (canvas, value) in [(&color, RED), (&depth, [z; 4])] {
@@ -218,19 +224,18 @@ fn a_host_scene_is_hidden_seen_and_seen_through_the_liquid() {
             let red = |c: &[f32; 3]| (0..3).all(|k| (c[k] - RED[k]).abs() < 1e-6);
             let middle = (SIZE[1] / 2 * SIZE[0] + SIZE[0] / 2) as usize;
             // Before the ball: the wall is all there is.
-            assert!(render(renderer, 2.0).iter().all(red), "{}: the wall hides the ball", driver.name);
+            assert!(render(renderer, at(2.0)).iter().all(red), "{}: the wall hides the ball", driver.name);
             // Behind it: the wall around, and through the ball's middle, where a ray goes almost straight, less what
             // two surfaces reflect (2 % each at normal incidence).
-            let picture = render(renderer, 4.0);
+            let picture = render(renderer, at(4.0));
             assert!(red(&picture[0]), "{}: the wall beside the ball {:?}", driver.name, picture[0]);
             let c = picture[middle];
             assert!(c[0] > 0.93 * RED[0] && c[0] < 1.05 * RED[0], "{}: through the ball {c:?}", driver.name);
-            // Nothing there (cleared depth): the environment, as without a scene.
+            // Nothing there (cleared depth): the environment, as without a scene, however red the image is.
             let plain = driver.shoot(&case).picture;
-            let z1 = p.w_axis.z / (1.0 + p.z_axis.z);
-            if z1.is_finite() && z1 > 0.0 {
-                assert_eq!(render(renderer, z1)[0], plain[0], "{}: the environment behind nothing", driver.name);
-            }
+            let cleared = render(renderer, 1.0);
+            assert_same(cleared.as_flattened(), &plain, &format!("{}: the environment behind nothing", driver.name));
+            assert!(!cleared.iter().any(red), "{}: red from nothing", driver.name);
         });
     });
 }

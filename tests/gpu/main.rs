@@ -3,9 +3,12 @@
 mod access;
 mod analytic;
 mod background;
+mod behind;
 mod compact;
 mod cull;
+mod drivers;
 mod extent;
+mod goldens;
 mod host;
 mod normals;
 mod occlude;

@@ -1,8 +1,9 @@
 //! What every GPU test shares: each driver with validation on, a frame of chosen particles, its targets read back.
 
+pub use crate::drivers::each_driver;
 use glam::{Mat3, Vec3};
 use meniscus::{
-    Background, Camera, Ellipsoid, Equirect, FrameInput, Particles, SceneInput, Settings,
+    Background, Camera, Ellipsoid, FrameInput, Particles, SceneInput, Settings,
     host::{Gpu, Instance, Session, Upload},
     inspect::{self, Inspection, Walk},
     optics::{Optics, four::Four, one::One, two::Two},
@@ -74,16 +75,25 @@ impl Shot {
 /// One driver: an instance of its own, so that its validation messages are its own too.
 pub struct Driver<'a> {
     pub instance: &'a Instance,
-    /// One renderer for all of a test's frames: sizes, particles and settings change under it as they do in an engine.
-    session: RefCell<Session<'a>>,
+    /// One renderer for all frames: sizes, particles and settings change under it as they do in an engine.
+    pub session: RefCell<Session<'a>>,
+    /// Of device and driver, as [`Instance::pick`] finds it.
     pub name: String,
 }
 
 impl<'a> Driver<'a> {
+    pub fn new(instance: &'a Instance, session: Session<'a>, name: &str) -> Driver<'a> {
+        Driver { instance, session: RefCell::new(session), name: name.into() }
+    }
+
+    pub fn end(self) {
+        self.session.into_inner().end();
+    }
+
     /// Renders a case (with `debug` targets) and reads everything back.
     pub fn shoot(&self, case: &Case) -> Shot {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
-        self.shoot_input(case, &|input| input)
+        self.shoot_input(case, 0, &|input| input)
     }
 
     /// The same for positions prepared on the device, with every neighbour listed; they begin at `offset` bytes of their
@@ -110,14 +120,13 @@ impl<'a> Driver<'a> {
             .laid_out(cloud.offset as u64, cloud.stride as u64)
             .options(cloud.options)
             .keep_class_below(cloud.keep_class_below);
-        self.session.borrow_mut().renderer.inspect(Inspection { walks: true, neighbours });
-        self.shoot_input(case, &|input| input.positions(positions))
+        self.shoot_input(case, neighbours, &|input| input.positions(positions))
     }
 
     /// The same before a scene of the host's.
     pub fn shoot_before(&self, case: &Case, scene: SceneInput, background: Background) -> Shot {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
-        let mut shot = self.shoot_input(case, &|input| input.scene(scene).background(background));
+        let mut shot = self.shoot_input(case, 0, &|input| input.scene(scene).background(background));
         let p = case.camera.projection;
         shot.frame.scene_z_scale = p.z_axis.z;
         shot.frame.scene_z_offset = p.w_axis.z / shot.space.radius as f32;
@@ -130,8 +139,9 @@ impl<'a> Driver<'a> {
         self.session.borrow().gpu
     }
 
-    fn shoot_input(&self, case: &Case, change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>) -> Shot {
+    fn shoot_input(&self, case: &Case, neighbours: u32, change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>) -> Shot {
         let session = &mut *self.session.borrow_mut();
+        session.renderer.inspect(Inspection { walks: true, neighbours });
         session.resize(case.size).expect("size");
         let input = FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null());
         let input = input.eye_inside(case.eye_inside);
@@ -153,37 +163,6 @@ impl<'a> Driver<'a> {
         let mut frame = inspect::uniforms(&case.camera, &case.settings, case.size, &space, bounds);
         frame.eye_inside = f32::from(case.eye_inside);
         Shot { frame, space, size: case.size, picture, targets }
-    }
-}
-
-/// Runs a test on every usable driver, with core and synchronization validation; any message fails it, and so does
-/// finding no driver at all, or not those that MENISCUS_DRIVERS (comma-separated parts of names) calls for.
-pub fn each_driver(test: impl Fn(&Driver)) {
-    let devices = Instance::new(false).and_then(|i| i.devices()).expect("a Vulkan loader");
-    let usable: Vec<_> = devices.into_iter().filter(|d| d.refusal.is_none()).collect();
-    assert!(!usable.is_empty(), "no usable Vulkan device: run ./setup.sh");
-    if let Ok(wanted) = std::env::var("MENISCUS_DRIVERS") {
-        for w in wanted.split(',').filter(|w| !w.is_empty()) {
-            let found = usable.iter().any(|d| d.name.to_lowercase().contains(&w.to_lowercase()));
-            assert!(found, "MENISCUS_DRIVERS calls for \"{w}\", which is not here");
-        }
-    }
-    for device in usable {
-        let instance = Instance::new(true).expect("validation layer: run ./setup.sh");
-        println!("driver: {} ({})", device.name, device.driver);
-        let name = device.name.clone();
-        let found = instance.pick(Some(&name)).expect("it was there a moment ago");
-        // What the inner scope does not destroy is among the messages.
-        {
-            let gpu = Gpu::new(&instance, found).expect("device");
-            let mut session = Session::new(&gpu, [1, 1], &Equirect::procedural_sky()).expect("session");
-            session.renderer.inspect(Inspection { walks: true, neighbours: 0 });
-            let driver = Driver { instance: &instance, session: RefCell::new(session), name: name.clone() };
-            test(&driver);
-            driver.session.into_inner().end();
-        }
-        let messages = instance.messages();
-        assert!(messages.is_empty(), "{name}: validation:\n{}", messages.join("\n"));
     }
 }
 

@@ -30,7 +30,8 @@ impl View {
         if !(self.fov_y > 0.0 && self.fov_y < 170.0) {
             return Err(wrong("fov-y", self.fov_y.to_string(), "use degrees above 0 and below 170"));
         }
-        if !self.up.normalize().is_finite() {
+        // Of a vector too long for its length to be a number the direction is nothing.
+        if !self.up.normalize().is_normalized() {
             return Err(wrong("up", self.up.to_string(), "use a finite direction that is not zero"));
         }
         for (name, point) in [("eye", self.eye), ("target", self.target)] {

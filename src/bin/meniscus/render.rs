@@ -158,13 +158,19 @@ fn plan<'a>(args: &'a Args, picture: Picture, scene: &'a Scene) -> Result<Job<'a
     };
     let size = [times(picture.size[0])?, times(picture.size[1])?];
     let picture = Picture {
-        radius: Some(scene.particles.radius.into()),
+        radius: Some(shortest(scene.particles.radius)),
         camera: view,
         settings: picture.settings(&scene.particles),
         absorption_given: true,
         ..picture
     };
     Ok(Job { args, picture, scene, prepared: None, camera, eye, settings, size, eye_inside: scene.inside(eye) })
+}
+
+/// A number as few digits say it, which is the same in single precision.
+fn shortest(value: f32) -> f64 {
+    let short = value.to_string().parse().ok().filter(|short| *short as f32 == value);
+    short.unwrap_or(value.into())
 }
 
 /// Renders and writes everything; says so if the picture shows none of the liquid.

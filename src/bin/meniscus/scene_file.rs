@@ -152,6 +152,7 @@ mod tests {
             ("radius = nan", &["radius", "NaN"]),
             ("camera = 5", &["camera"]),
             ("[camera]\nup = [0, 0, 0]", &["up"]),
+            ("[camera]\nup = [1e300, 1e300, 0]", &["up"]),
             ("[camera]\neye = [1, 2]", &["camera.eye"]),
             ("[camera]\neye = [inf, 2, 1]", &["eye"]),
             ("[camera]\nfov_y = 180", &["fov"]),

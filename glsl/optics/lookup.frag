@@ -1,0 +1,92 @@
+// One refraction as a look-up in the picture of what lies behind, moved sideways by what the surface is like: screen-space
+// fluid rendering (Green10; Im16 figs. 4 and 5) and Instant Liquids (Cords08). Nothing is traced.
+#version 460
+// Compiled with any of: SCENE, CUBE, THICKNESS
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "shared.glsl"
+#include "frame.glsl"
+#include "normal.glsl"
+#include "optics.glsl"
+layout(constant_id = 0) const uint MODE = 0; // one of LOOKUP_…
+layout(constant_id = 1) const bool EXACT_FRESNEL = false;
+layout(constant_id = 2) const bool ENCODE_SRGB = false;
+layout(constant_id = 3) const bool HOST_BACKGROUND = false; // only liquid is drawn, over what is there
+layout(set = 0, binding = 1) uniform texture2DArray body_depth;
+layout(set = 0, binding = 2) uniform utexture2DArray body_normal;
+#ifdef THICKNESS
+layout(set = 0, binding = 3) uniform texture2D thickness; // in particle radii
+#endif
+layout(push_constant) uniform PushBlock {
+    float strength;          // of the offset
+    float thickness_scale;   // of T = 1 - exp(-scale thickness), over the particle radius
+    float light_x;           // towards the light, in eye space, of length 1
+    float light_y;
+    float light_z;
+    float diffuse;           // fraction of white that is scattered
+    float specular;          // of the light's mirror image
+    float shininess;         // its exponent
+} push;
+layout(location = 0) out vec4 out_color;
+#include "environment.glsl"
+#include "scene.glsl"
+
+const uint SSFR = 0u;       // the normal, times T, is the offset
+const uint SSFR_INDEX = 1u; // where the bent ray's direction vanishes, with an index that grows with T
+const uint CORDS = 2u;      // the bent ray's lateral components are the offset
+
+// What lies behind the liquid at a position of the picture, as far as the picture reaches.
+vec3 seen_at(vec2 p) {
+#ifdef SCENE
+    ivec2 pixel = clamp(ivec2(floor(p)), ivec2(0), ivec2(frame.size) - 1);
+    if (HOST_BACKGROUND || scene_linear(pixel) < CLEARED) return scene_light(pixel);
+#endif
+    return env_color(normalize(view_ray(p)));
+}
+
+// Moved by parts of the picture's edges, y up.
+vec3 seen_beside(vec2 offset) { return seen_at(gl_FragCoord.xy + offset * sign(frame.pixel_scale) * frame.size); }
+
+vec3 refracted(vec3 dir, vec3 n, float t_weight) {
+    if (MODE == SSFR) return seen_beside(push.strength * t_weight * n.xy);
+    if (MODE == CORDS) return seen_beside(push.strength * refract(dir, n, 1.0 / frame.ior).xy);
+    // Im16 fig. 5 prints "refract(...).xy - E.z"; what it must mean is the perspective division.
+    vec3 bent = refract(dir, n, mix(frame.ior, 1.0, t_weight) / frame.ior);
+    return bent.z < 0.0 ? seen_at(project(bent)) : infinitely_far(bent);
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec3 v = view_ray(gl_FragCoord.xy), dir = normalize(v);
+    float depth = texelFetch(body_depth, ivec3(pixel, SIDE_FRONT), 0).x;
+    bool inside = depth < 0.0; // a particle around the near plane: nothing to bend at
+    if (depth == 0.0 || scene_hides(pixel, inside ? frame.near : depth)) {
+        if (HOST_BACKGROUND) discard;
+        vec3 color = behind(pixel, dir);
+        out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
+        return;
+    }
+    vec3 n = decode_normal(texelFetch(body_normal, ivec3(pixel, SIDE_FRONT), 0).x);
+    if (inside) n = -dir;
+    if (dot(dir, n) > 0.0) n = -n;
+    float length_inside = 0.0;
+#ifdef THICKNESS
+    length_inside = texelFetch(thickness, pixel, 0).x;
+#endif
+    float t_weight = 1.0 - exp(-push.thickness_scale * length_inside);
+    vec3 color = inside ? seen_at(gl_FragCoord.xy) : refracted(dir, n, t_weight);
+    color *= exp(-frame.absorption * length_inside);
+    if (!inside) {
+        vec3 bent = refract(dir, n, 1.0 / frame.ior);
+        float reflectance = fresnel(-dot(dir, n), -dot(bent, n), frame.ior, EXACT_FRESNEL);
+        color = mix(color, infinitely_far(reflect(dir, n)), reflectance);
+        if (MODE == CORDS) {
+            // Phong: white light from far away.
+            vec3 light = vec3(push.light_x, push.light_y, push.light_z);
+            float facing = dot(light, n), mirror = max(dot(reflect(dir, n), light), 0.0);
+            color += push.diffuse * max(facing, 0.0);
+            if (facing > 0.0 && mirror > 0.0) color += push.specular * exp(push.shininess * log(mirror));
+        }
+    }
+    out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
+}

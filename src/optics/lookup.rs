@@ -1,0 +1,79 @@
+//! One refraction as a look-up in the picture behind the liquid (`glsl/optics/lookup.frag`): what screen-space fluid
+//! rendering does in place of following rays.
+
+use super::Fresnel;
+use crate::{
+    frame::Scene,
+    input::{Background, EnvironmentShape},
+    layers::Surfaces,
+    plan::{Call, External, Plan, Rendering, Vertices},
+    shader::{LOOKUP_FRAG, REFRACT_VERT},
+};
+use glam::Vec3;
+
+/// How the look-up is moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// By the normal, times a function of the thickness (Green10, Im16 fig. 4).
+    Normal,
+    /// To where the bent ray's direction vanishes, with an index that grows with the thickness (Im16 fig. 5).
+    Index,
+    /// By the bent ray's lateral components (Cords08).
+    Bent,
+}
+
+/// What a look-up is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lookup {
+    /// How it is moved.
+    pub mode: Mode,
+    /// How far.
+    pub strength: f32,
+    /// Of T = 1 - exp(-scale thickness), over the particle radius.
+    pub thickness_scale: f32,
+    /// Reflectance.
+    pub fresnel: Fresnel,
+    /// Towards the light, in the world.
+    pub light: Vec3,
+    /// Fraction of white that is scattered, that is mirrored, and the exponent of that (Phong).
+    pub phong: [f32; 3],
+}
+
+impl Lookup {
+    /// Draws the picture; without liquid only what is behind it.
+    pub(super) fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
+        let body = surfaces.body.unwrap_or_else(|| super::walk::placeholder(plan));
+        let (cube, thickness) = (scene.environment == EnvironmentShape::Cube, surfaces.thickness);
+        let variant = usize::from(scene.has_scene) + 2 * usize::from(cube) + 4 * usize::from(thickness.is_some());
+        let light = self.light.as_dvec3().normalize_or_zero().as_vec3();
+        let light = scene.eye.transform_vector3(light);
+        let [diffuse, specular, shininess] = self.phong;
+        let mut call = Call::draw(&REFRACT_VERT, &LOOKUP_FRAG[variant])
+            .read("body_depth", body.depth)
+            .read("body_normal", body.normal)
+            .read("environment", plan.given(External::Environment))
+            .constant("MODE", self.mode as u32)
+            .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact)
+            .constant("ENCODE_SRGB", scene.encode_srgb())
+            .constant("HOST_BACKGROUND", scene.background == Background::Host)
+            .push("strength", self.strength)
+            .push("thickness_scale", self.thickness_scale)
+            .push("light_x", light.x)
+            .push("light_y", light.y)
+            .push("light_z", light.z)
+            .push("diffuse", diffuse)
+            .push("specular", specular)
+            .push("shininess", shininess);
+        if let Some(thickness) = thickness {
+            call = call.read("thickness", thickness);
+        }
+        if scene.has_scene {
+            call = call
+                .read("scene_color", plan.given(External::SceneColor))
+                .read("scene_depth", plan.given(External::SceneDepth));
+        }
+        let output = plan.given(External::Output(scene.output));
+        let rendering = Rendering::into(output, 0).keeping(scene.background == Background::Host);
+        plan.render("look up", rendering, vec![(call, Vertices::Direct(3))]);
+    }
+}
