@@ -106,7 +106,11 @@ impl Picture {
     pub fn validate(&self) -> Result<(), Error> {
         if let Some(radius) = self.radius.filter(|r| !meniscus::space::RADII.contains(&(*r as f32))) {
             let (least, most) = (meniscus::space::RADII.start(), meniscus::space::RADII.end());
-            return Err(wrong("radius", format!("{radius:e}"), format!("use {least:e} to {most:e}; scale the scene if need be")));
+            return Err(wrong(
+                "radius",
+                format!("{radius:e}"),
+                format!("use {least:e} to {most:e}; scale the scene if need be"),
+            ));
         }
         if self.splash_threshold.is_nan() {
             return Err(wrong("splash_threshold", self.splash_threshold, "use a number"));
