@@ -54,6 +54,11 @@ fn bad_parameters_are_refused() {
     refuse(2, &["--absorption", "1,2"], &["absorption", "three finite"]);
     refuse(2, &["--weighting", "none"], &["weighting", "euclidean"]);
     refuse(2, &["--occlusion-culling", "no"], &["occlusion-culling", "false"]);
+    refuse(1, &["--max-ratio", "0.5"], &["max_ratio", "1 to 1000"]);
+    refuse(1, &["--support", "1e-9"], &["support", "2 to 64 radii"]);
+    refuse(1, &["--splash-threshold", "nan"], &["splash_threshold", "a number"]);
+    refuse(2, &["--min-neighbours", "-3"], &["min-neighbours", "0 to"]);
+    refuse(2, &["--search", "nowhere"], &["search", "runs", "relation"]);
     refuse(1, &["--window", "8"], &["window", "odd"]);
     refuse(1, &["--window", "27"], &["window", "25"]);
     refuse(1, &["--window", "11", "--supersample", "3"], &["window is 11", "--supersample 3", "9 at most"]);

@@ -21,7 +21,7 @@ fn saved_scenes_render_the_same_picture() {
     map(0).save(run.path("sub/sky.png")).expect("saved");
     let all = "sub/far.csv --env sub/sky.png --env-rotate 33.3 --radius 0.05 --optics two --fresnel exact --window 7 \
                --supersample 2 --drop-invalid --splash-threshold 0.3 --up 0.1,1,0 --fov-y 33 --sigma 4.7 --ior 1.31 \
-               --max-memory 1G --prepare gpu";
+               --max-memory 1G --prepare gpu --smoothing 0.5 --max-semi-axis 1.1";
     let some = "sub/far.csv --drop-invalid --smooth none --target 1000000.1,0,0 --absorption 0.3,0.2,0.1";
     for args in ["", &format!("{near} --optics one"), all, some] {
         let first: Vec<_> = args.split_whitespace().chain(["--save-scene", "sub/s.toml", "--dump", "a"]).collect();
@@ -79,6 +79,8 @@ fn bad_scene_files_are_refused() {
     refuse(&[0xff, 0xfe, 0x00], &["no text"]);
     refuse(&vec![b'#'; 2 << 20], &["larger than"]);
     refuse(b"[camera]\nup = [0, 0, 0]", &["up"]);
+    refuse(b"[preparation]\nsmoothing = 2.0", &["smoothing is 2", "0 to 1"]);
+    refuse(b"[preparation]\nsupport = true", &["preparation.support", "invalid type"]);
     run.refused(1, &["render", "--scene", "missing.toml", "-o", "out.png"], &["missing.toml", "--save-scene"]);
     run.file("lost.toml", "particles = \"missing.vtk\"");
     run.refused(1, &["render", "--scene", "lost.toml", "-o", "out.png"], &["missing.vtk", "no such file"]);

@@ -1,7 +1,7 @@
 //! Parameters are described once, in the library: the command line and what it writes follow.
 
 use crate::{Run, block, text};
-use meniscus::Settings;
+use meniscus::{Settings, parameters::Part, prepare};
 use serde_json::{Value, json};
 use std::fs;
 
@@ -13,7 +13,8 @@ fn read(run: &Run, name: &str) -> Value {
 fn help_lists_every_parameter_as_the_library_describes_it() {
     for command in ["render", "bench"] {
         let said = text(&Run::new().command(&[command, "--help"]));
-        for part in Settings::parts() {
+        let preparation = Part::group("preparation", Box::<prepare::Options>::default());
+        for part in Settings::parts().into_iter().chain([preparation]) {
             for (member, parameters) in &part.members {
                 if !member.is_empty() {
                     assert!(said.contains(&format!("--{} <NAME>", part.name)), "{command}: no --{}", part.name);

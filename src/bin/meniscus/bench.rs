@@ -191,13 +191,13 @@ fn all(
     }
     if args.scenes || (files.is_empty() && !args.scaling) {
         add("embedded dam break".into(), picture.load(None, place)?)?;
-        add("block of 100,000".into(), Scene::synthetic(block(100_000), RADIUS, place)?)?;
-        add("20,000 droplets".into(), Scene::synthetic(droplets(20_000), RADIUS, place)?)?;
+        add("block of 100,000".into(), Scene::synthetic(block(100_000), RADIUS, picture)?)?;
+        add("20,000 droplets".into(), Scene::synthetic(droplets(20_000), RADIUS, picture)?)?;
     }
     if args.scaling {
         for n in SIZES {
             if n <= args.max_particles {
-                add(format!("block of {n}"), Scene::synthetic(block(n), RADIUS, place)?)?;
+                add(format!("block of {n}"), Scene::synthetic(block(n), RADIUS, picture)?)?;
             }
         }
     }

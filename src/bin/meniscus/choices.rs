@@ -6,7 +6,7 @@ use clap::{
     builder::{PossibleValue, PossibleValuesParser},
     parser::ValueSource,
 };
-use meniscus::{Error, PRESETS, Parameter, Parameters, Preset, Settings};
+use meniscus::{Error, PRESETS, Parameter, Parameters, Preset, Settings, parameters::Part, prepare};
 use serde_json::{Map, Value, json};
 
 /// Where nothing is given, the command line knows better than the library, which does not know the liquid's size.
@@ -33,10 +33,17 @@ struct Flag {
     of: Vec<(&'static str, Parameter)>,
 }
 
+/// All there is to choose and to set: how particles are prepared, and the frame's settings.
+fn parts() -> Vec<Part> {
+    let mut parts = Settings::parts();
+    parts.push(Part::group("preparation", Box::<prepare::Options>::default()));
+    parts
+}
+
 /// A flag for every parameter of every member.
 fn flags() -> Vec<Flag> {
     let mut flags: Vec<Flag> = Vec::new();
-    for part in Settings::parts() {
+    for part in parts() {
         for (member, parameters) in &part.members {
             for p in parameters.parameters() {
                 match flags.iter_mut().find(|f| f.name == p.name) {
@@ -103,7 +110,7 @@ impl Flag {
 /// Whether a text is a value of this parameter in any member; if not, what to use.
 fn readable(name: &str, text: &str) -> Result<String, String> {
     let mut refused = String::new();
-    for (_, mut member) in Settings::parts().into_iter().flat_map(|part| part.members) {
+    for (_, mut member) in parts().into_iter().flat_map(|part| part.members) {
         if member.parameters().iter().any(|p| p.name == name) {
             match member.set(name, text) {
                 Ok(()) => return Ok(text.to_owned()),
@@ -179,7 +186,12 @@ impl Choices {
     }
 
     /// Changes settings as was said: first the method, then members of families, then parameters.
-    pub fn apply(&self, settings: &mut Settings, instead: Option<&Preset>) -> Result<(), Error> {
+    pub fn apply(
+        &self,
+        settings: &mut Settings,
+        preparation: &mut prepare::Options,
+        instead: Option<&Preset>,
+    ) -> Result<(), Error> {
         if let Some(preset) = instead.or(self.preset) {
             settings.method = preset.method();
         }
@@ -187,10 +199,14 @@ impl Choices {
             settings.method.choose(family, member)?;
         }
         for (name, value) in &self.values {
-            if !settings.parameters().iter().any(|p| p.name == *name) {
+            let has = |all: &[Parameter]| all.iter().any(|p| p.name == *name);
+            if has(&settings.parameters()) {
+                settings.set(name, value)?;
+            } else if has(&preparation.parameters()) {
+                preparation.set(name, value)?;
+            } else {
                 return Err(lacking(settings, name, value));
             }
-            settings.set(name, value)?;
         }
         Ok(())
     }
@@ -280,6 +296,7 @@ mod tests {
     #[test]
     fn every_parameter_has_a_flag_and_sets_itself_alone() {
         let mut names = 0;
+        let of = prepare::Options::default;
         for part in Settings::parts() {
             for (member, parameters) in &part.members {
                 for p in parameters.parameters() {
@@ -289,7 +306,7 @@ mod tests {
                     let word = p.choices.iter().find(|w| **w != p.default).map_or(p.default.as_str(), |w| w);
                     let mut settings = Settings::default();
                     let choices = parsed(&format!("{choose} --{}={word}", kebab(p.name))).expect("a flag");
-                    choices.apply(&mut settings, None).expect("set");
+                    choices.apply(&mut settings, &mut of(), None).expect("set");
                     let mut expected = Settings::default();
                     if !member.is_empty() {
                         expected.method.choose(part.name, member).expect("a member");
@@ -301,12 +318,21 @@ mod tests {
             }
         }
         assert!(names > 10, "only {names}");
+        for p in of().parameters() {
+            let (mut settings, mut options, mut expected) = (Settings::default(), of(), of());
+            let word = if p.choices.is_empty() { "0.75" } else { p.choices[1] };
+            let word = if expected.set(p.name, word).is_ok() { word } else { "7" };
+            expected.set(p.name, word).expect("a value");
+            let choices = parsed(&format!("--{}={word}", kebab(p.name))).expect("a flag");
+            choices.apply(&mut settings, &mut options, None).expect("set");
+            assert!(options == expected && options != of() && settings == Settings::default(), "{}", p.name);
+        }
     }
 
     /// A flag would set only the first of them.
     #[test]
     fn no_two_parts_have_a_parameter_of_one_name() {
-        for part in Settings::parts() {
+        for part in parts() {
             for (_, p) in part.members.iter().flat_map(|(m, p)| p.parameters().into_iter().map(move |p| (m, p))) {
                 let flag = flags().into_iter().find(|f| f.name == p.name).expect("a flag");
                 assert_eq!(flag.part, part.name, "{}", p.name);

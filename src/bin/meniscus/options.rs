@@ -7,7 +7,7 @@ use crate::{
     scene_file, terminal,
 };
 use glam::DVec3;
-use meniscus::{Error, Preset, io::Budget};
+use meniscus::{Error, Parameters, Preset, io::Budget};
 use std::{fmt::Display, path::PathBuf};
 
 /// What is drawn, from where, how, and on what. What is not given is as the scene file has it, or as by default.
@@ -40,10 +40,6 @@ pub struct Options {
     /// Particle radius in world units; from the file, or estimated from spacing, if not given
     #[arg(long, value_name = "R", allow_hyphen_values = true)]
     radius: Option<f64>,
-    #[arg(long, value_name = "T", allow_negative_numbers = true, help = or(
-        "Particles with less than this share of a filled body's density are splash", Picture::default().splash_threshold
-    ))]
-    splash_threshold: Option<f32>,
     #[arg(long, value_name = "SIZE", help = or(
         "Most memory that reading one file may take, with K, M, G or T. A small file may take less: 32 times its size and \
          a 32nd of this", Picture::default().max_memory
@@ -113,12 +109,13 @@ impl Options {
         replace(&mut picture.environment.file, &self.env.clone().map(Some));
         replace(&mut picture.environment.rotation, &self.env_rotate);
         replace(&mut picture.radius, &self.radius.map(Some));
-        replace(&mut picture.splash_threshold, &self.splash_threshold);
         replace(&mut picture.max_memory, &self.max_memory);
         replace(&mut picture.prepare, &self.prepare.map(Some));
         picture.drop_invalid |= self.drop_invalid;
         picture.absorption_given |= self.choices.gives(choices::LEFT_OPEN);
-        self.choices.apply(&mut picture.settings, method)?;
+        self.choices.apply(&mut picture.settings, &mut picture.preparation, method)?;
+        picture.preparation.validate()?;
+        picture.settings.validate()?;
         Ok(picture)
     }
 }

@@ -7,7 +7,7 @@ use crate::{
 };
 use glam::Vec3;
 use meniscus::{
-    Camera, Equirect, Error, Particles, Settings,
+    Camera, Equirect, Error, Parameters, Particles, Settings,
     io::{
         Budget,
         images::{self, ImageError},
@@ -30,7 +30,6 @@ pub struct Picture {
     pub particles: Option<PathBuf>,
     /// In world units; the file's, or estimated, if there is none.
     pub radius: Option<f64>,
-    pub splash_threshold: f32,
     pub drop_invalid: bool,
     /// Each command has a default of its own.
     pub prepare: Option<Prepare>,
@@ -43,6 +42,8 @@ pub struct Picture {
     pub max_memory: Budget,
     pub camera: View,
     pub environment: Environment,
+    /// How classes and ellipsoids are made; a support that is not given is the file's.
+    pub preparation: prepare::Options,
     pub settings: Settings,
     /// Whether the absorption of the settings is meant, or is to suit the liquid's size.
     #[serde(skip)]
@@ -67,7 +68,6 @@ impl Default for Picture {
         Picture {
             particles: None,
             radius: None,
-            splash_threshold: prepare::Options::default().splash_threshold,
             drop_invalid: false,
             prepare: None,
             supersample: 1,
@@ -75,6 +75,7 @@ impl Default for Picture {
             max_memory: Budget::default(),
             camera: View::default(),
             environment: Environment::default(),
+            preparation: prepare::Options::default(),
             settings: Settings::default(),
             absorption_given: false,
         }
@@ -112,9 +113,6 @@ impl Picture {
                 format!("use {least:e} to {most:e}; scale the scene if need be"),
             ));
         }
-        if self.splash_threshold.is_nan() {
-            return Err(wrong("splash_threshold", self.splash_threshold, "use a number"));
-        }
         if !SUPERSAMPLE.contains(&i64::from(self.supersample)) {
             let (least, most) = (SUPERSAMPLE.start(), SUPERSAMPLE.end());
             return Err(wrong("supersample", self.supersample, format!("use {least} to {most}")));
@@ -126,6 +124,7 @@ impl Picture {
             return Err(wrong("environment.rotation", self.environment.rotation, "use a finite number of degrees"));
         }
         self.camera.validate()?;
+        self.preparation.validate()?;
         self.settings.validate()
     }
 

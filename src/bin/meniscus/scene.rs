@@ -54,8 +54,8 @@ impl Prepare {
         self.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned())
     }
 
-    fn search(self) -> Search {
-        if self == Prepare::GpuRelation { Search::Relation } else { Search::Runs }
+    fn search(self, otherwise: Search) -> Search {
+        if self == Prepare::GpuRelation { Search::Relation } else { otherwise }
     }
 }
 
@@ -98,10 +98,9 @@ impl Scene {
             .map(|c| c.iter().map(|c| if *c == 0 { Class::Splash } else { Class::Body }).collect());
         let axes: Option<Vec<Mat3>> = file.axes.as_ref().map(|a| a.iter().map(|m| m.as_mat3()).collect());
         let options = Options {
-            support: file.support.map(|s| s as f32),
-            splash_threshold: picture.splash_threshold,
-            search: prepare.search(),
-            ..Options::default()
+            support: picture.preparation.support.or(file.support.map(|s| s as f32)),
+            search: prepare.search(picture.preparation.search),
+            ..picture.preparation
         };
         if prepare.on_device() && (classes.is_some() || axes.is_some()) {
             return Err(
@@ -125,8 +124,9 @@ impl Scene {
     }
 
     /// Positions that were made, not read.
-    pub fn synthetic(positions: Vec<Vec3>, radius: f32, place: Prepare) -> Result<Scene, Box<dyn Error>> {
-        let options = Options { search: place.search(), ..Options::default() };
+    pub fn synthetic(positions: Vec<Vec3>, radius: f32, picture: &Picture) -> Result<Scene, Box<dyn Error>> {
+        let place = picture.place();
+        let options = Options { search: place.search(picture.preparation.search), ..picture.preparation };
         let input = Input { positions: &positions, radius, classes: None, ellipsoids: None };
         let (particles, report, prepare_ms) = make(&input, &options, place)?;
         Ok(Scene {
@@ -169,7 +169,7 @@ fn make(input: &Input, options: &Options, place: Prepare) -> Result<(Particles, 
     let bar = progress(input.positions.len() as u64, "classes and ellipsoids");
     let start = std::time::Instant::now();
     let (particles, report) = if place.on_device() {
-        (uniform(input.positions, input.radius), Report::default())
+        (uniform(input, options), Report::default())
     } else {
         prepare::prepare_with_progress(input, options, &|done| bar.set_position(done as u64))?
     };
@@ -179,9 +179,10 @@ fn make(input: &Input, options: &Options, place: Prepare) -> Result<(Particles, 
 }
 
 /// Spheres as large as any ellipsoid that the device may make: for the camera, and for the box around the liquid.
-fn uniform(positions: &[Vec3], radius: f32) -> Particles {
-    let axes = Mat3::from_diagonal(Vec3::splat(radius * Options::default().max_semi_axis));
-    let ellipsoids = positions.iter().map(|p| Ellipsoid { center: *p, axes }).collect();
+fn uniform(input: &Input, options: &Options) -> Particles {
+    let radius = input.radius;
+    let axes = Mat3::from_diagonal(Vec3::splat(radius * options.max_semi_axis));
+    let ellipsoids = input.positions.iter().map(|p| Ellipsoid { center: *p, axes }).collect();
     Particles { radius, ellipsoids, splash_count: 0 }
 }
 

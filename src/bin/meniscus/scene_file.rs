@@ -159,6 +159,8 @@ mod tests {
             ("[environment]\nrotation = inf", &["environment.rotation"]),
             ("supersample = 4", &["supersample", "1 to 3"]),
             ("max_memory = \"lots\"", &["max_memory", "512M"]),
+            ("[preparation]\nsearch = 1", &["preparation.search"]),
+            ("[preparation]\nsplash_threshold = nan", &["splash_threshold", "a number"]),
             ("prepare = \"tpu\"", &["prepare", "gpu-relation"]),
             ("[settings.liquid]\nior = 0.5", &["ior", "above 1"]),
             ("[settings.liquid]\ncolour = 0.5", &["settings.liquid.colour", "ior"]),
