@@ -62,7 +62,8 @@ fn statics(compiler: &shaderc::Compiler, file: &str, source: &str) -> String {
             writeln!(rust, "/// glsl/{file} with {m}\npub static {stem}_{m}_{stage}: Shader = {shader};").unwrap();
         }
     } else if let Some(macros) = listed("any") {
-        let some = |set: usize| macros.iter().enumerate().filter(move |(i, _)| set >> i & 1 == 1).map(|(_, m)| m.as_str());
+        let some =
+            |set: usize| macros.iter().enumerate().filter(move |(i, _)| set >> i & 1 == 1).map(|(_, m)| m.as_str());
         let all: Vec<_> =
             (0..1 << macros.len()).map(|set| shader(compiler, file, source, &some(set).collect::<Vec<_>>())).collect();
         writeln!(rust, "/// glsl/{file} by {}", macros.join(", ")).unwrap();

@@ -33,7 +33,8 @@ pub(crate) struct Offers {
 }
 
 impl Offers {
-    const WORDS: [&'static str; 3] = ["the far side of the liquid", "the particles' own normals", "the liquid's thickness"];
+    const WORDS: [&'static str; 3] =
+        ["the far side of the liquid", "the particles' own normals", "the liquid's thickness"];
 
     fn all(self) -> [bool; 3] {
         [self.backs, self.normals, self.thickness]

@@ -59,7 +59,16 @@ macro_rules! plain_value {
         }
     )*};
 }
-plain_value!(u32, f32);
+plain_value!(u32, f32, usize);
+
+impl Value for Option<f32> {
+    fn parse(text: &str) -> Option<Self> {
+        if text.trim() == "none" { Some(None) } else { f32::parse(text).map(Some) }
+    }
+    fn text(self) -> String {
+        self.map_or("none".into(), f32::text)
+    }
+}
 
 impl Value for bool {
     const CHOICES: &'static [&'static str] = &["true", "false"];
@@ -103,8 +112,16 @@ macro_rules! choices {
 pub(crate) use choices;
 
 /// A struct of parameters: for each its documentation, type and default, then unit, what it must be, and a check of that.
+/// Attributes in brackets before it take the place of `non_exhaustive`.
 macro_rules! parameters {
-    ($(#[doc = $about:literal])+ pub struct $Name:ident { $(
+    ($(#[doc = $about:literal])+ pub struct $Name:ident { $($body:tt)* }) => {
+        $crate::parameters::parameters! {
+            [#[non_exhaustive]]
+            $(#[doc = $about])+
+            pub struct $Name { $($body)* }
+        }
+    };
+    ([$(#[$meta:meta])*] $(#[doc = $about:literal])+ pub struct $Name:ident { $(
         $(#[doc = $doc:literal])+
         $field:ident: $Type:ty = $default:expr, $unit:literal, $range:literal => $check:expr;
     )* }) => {
@@ -112,7 +129,7 @@ macro_rules! parameters {
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
-        #[non_exhaustive]
+        $(#[$meta])*
         pub struct $Name { $(
             $(#[doc = $doc])+
             #[doc = concat!("\n\n", "Unit: ", $unit, ". Use ", $range, ". Default: `", stringify!($default), "`.")]
@@ -202,6 +219,13 @@ pub struct Part {
     /// The members of a family, by name and with their default parameters; or one without a name, where there is nothing to
     /// choose.
     pub members: Vec<(&'static str, Box<dyn Parameters>)>,
+}
+
+impl Part {
+    /// Parameters with nothing to choose between.
+    pub fn group(name: &'static str, parameters: Box<dyn Parameters>) -> Part {
+        Part { name, about: "", members: vec![("", parameters)] }
+    }
 }
 
 /// A family of methods that do the same work: one enum, each member with parameters of its own in a module of its own.

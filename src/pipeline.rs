@@ -15,8 +15,7 @@ type Made = Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>;
 
 impl Blend {
     fn state(self) -> vk::PipelineColorBlendAttachmentState {
-        let state =
-            vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
+        let state = vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
         let op = match self {
             Blend::Replace => return state,
             Blend::Add => vk::BlendOp::ADD,
@@ -226,12 +225,7 @@ impl Pipeline {
         unsafe { host.device.create_graphics_pipelines(host.pipeline_cache, &[info], None) }
     }
 
-    fn finish(
-        &mut self,
-        host: &Host,
-        name: &str,
-        made: Made,
-    ) -> Result<(), Error> {
+    fn finish(&mut self, host: &Host, name: &str, made: Made) -> Result<(), Error> {
         match made {
             Ok(pipelines) => {
                 self.handle = pipelines[0];

@@ -1,6 +1,10 @@
 //! GPU time of each pass: one scope a pass, a pair of timestamps each, read without waiting.
 
-use crate::{Error, device::Host, plan::{Home, Step}};
+use crate::{
+    Error,
+    device::Host,
+    plan::{Home, Step},
+};
 use ash::vk;
 
 /// GPU time of one pass in milliseconds.
@@ -40,7 +44,13 @@ impl Profiler {
     pub fn new(host: &Host) -> Option<Profiler> {
         let limits = host.limits();
         let period_ns = f64::from(limits.timestamp_period?);
-        Some(Profiler { pool: vk::QueryPool::null(), room: 0, names: Vec::new(), period_ns, mask: limits.timestamp_mask })
+        Some(Profiler {
+            pool: vk::QueryPool::null(),
+            room: 0,
+            names: Vec::new(),
+            period_ns,
+            mask: limits.timestamp_mask,
+        })
     }
 
     /// Makes room for so many scopes; the slot's last frame has completed.

@@ -114,7 +114,8 @@ impl Recorder<'_> {
             }
             Work::Render { rendering, draws } => {
                 self.begin_rendering(rendering)?;
-                let drawn = draws.iter().try_for_each(|(call, vertices)| self.draw(step.pass, rendering, call, vertices));
+                let drawn =
+                    draws.iter().try_for_each(|(call, vertices)| self.draw(step.pass, rendering, call, vertices));
                 // SAFETY: ends the rendering begun above.
                 unsafe { device.cmd_end_rendering(cmd) };
                 drawn?;
@@ -123,13 +124,7 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    fn draw(
-        &self,
-        pass: &'static str,
-        rendering: &Rendering,
-        call: &Call,
-        vertices: &Vertices,
-    ) -> Result<(), Error> {
+    fn draw(&self, pass: &'static str, rendering: &Rendering, call: &Call, vertices: &Vertices) -> Result<(), Error> {
         let (device, cmd) = (&self.host.device, self.cmd);
         self.bind(pass, call)?;
         if let Some(depth) = &rendering.depth {

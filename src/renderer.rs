@@ -452,7 +452,7 @@ fn check_memory(host: &Host, limits: &Limits, tables: &[Table; 2], plan: &Plan) 
 }
 
 /// Each once.
-fn unique<'a>(recipes: Vec<&'a Recipe>) -> Vec<&'a Recipe> {
+fn unique(recipes: Vec<&Recipe>) -> Vec<&Recipe> {
     let mut seen = HashSet::new();
     recipes.into_iter().filter(|r| seen.insert(*r)).collect()
 }

@@ -58,10 +58,9 @@ impl Settings {
 
     /// What settings consist of: all there is to choose and to set.
     pub fn parts() -> Vec<Part> {
-        let group = |name, one: Box<dyn Parameters>| Part { name, about: "", members: vec![("", one)] };
         let mut parts = Method::families();
-        parts.push(group("liquid", Box::new(Liquid::default())));
-        parts.push(group("drawing", Box::new(Drawing::default())));
+        parts.push(Part::group("liquid", Box::<Liquid>::default()));
+        parts.push(Part::group("drawing", Box::<Drawing>::default()));
         parts
     }
 

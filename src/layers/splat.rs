@@ -49,7 +49,14 @@ pub(super) struct Names {
 }
 
 /// Draws some classes together, on each side that is wanted.
-pub(super) fn surface(plan: &mut Plan, scene: &Scene, drawn: &Drawn, classes: &[u32], sides: u32, names: &Names) -> Surface {
+pub(super) fn surface(
+    plan: &mut Plan,
+    scene: &Scene,
+    drawn: &Drawn,
+    classes: &[u32],
+    sides: u32,
+    names: &Names,
+) -> Surface {
     let depth = plan.map(names.depth, Format::R32_SFLOAT, sides);
     let normal = plan.map(names.normal, Format::R32_UINT, sides);
     // The depth test of whichever class and side is being drawn.

@@ -18,13 +18,9 @@ parameters! {
     pub struct Split {}
 }
 
-const SPLASH: Names =
-    Names { depth: "splash depth", normal: "splash normal", passes: ["splash front", "splash back"] };
-pub(super) const BODY: Names = Names {
-    depth: "body depth (ray-cast)",
-    normal: "body normal (ray-cast)",
-    passes: ["body front", "body back"],
-};
+const SPLASH: Names = Names { depth: "splash depth", normal: "splash normal", passes: ["splash front", "splash back"] };
+pub(super) const BODY: Names =
+    Names { depth: "body depth (ray-cast)", normal: "body normal (ray-cast)", passes: ["body front", "body back"] };
 
 impl Layering for Split {
     fn offers(&self) -> Offers {

@@ -19,10 +19,7 @@ pub(crate) fn record(plan: &mut Plan, scene: &Scene, prepare: &Prepare) -> Targe
     let relation = prepare.entries_per_particle != 1;
     let find = Call::compute(&EXTENT_PLAN_COMP).update("frame", frame).constant("RELATION_TABLE", relation);
     for (call, groups) in [(reduce, per_block(scene.count)), (find, Groups::Direct([1, 1, 1]))] {
-        let call = call
-            .read("positions", positions)
-            .update("extent", extent)
-            .push_all(prepare);
+        let call = call.read("positions", positions).update("extent", extent).push_all(prepare);
         plan.dispatch("extent", call, groups);
     }
     extent

@@ -5,8 +5,8 @@ use crate::{
     frame::{Preparation, Scene},
     plan::{Call, External, Groups, Plan, Target},
     shader::{
-        DIGITS, EXTENT_DISPATCH, Prepare, SORT_COUNT_COMP, SORT_GATHER_COMP, SORT_PASSES, SORT_SCAN_COMP, SORT_SCATTER_COMP,
-        Shader,
+        DIGITS, EXTENT_DISPATCH, Prepare, SORT_COUNT_COMP, SORT_GATHER_COMP, SORT_PASSES, SORT_SCAN_COMP,
+        SORT_SCATTER_COMP, Shader,
     },
 };
 

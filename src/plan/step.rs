@@ -17,9 +17,20 @@ pub(crate) struct Step {
 
 pub(crate) enum Work {
     /// One word, all over a range of a buffer.
-    Fill { buffer: Target, offset: u64, bytes: u64, word: u32 },
-    Dispatch { call: Call, groups: Groups },
-    Render { rendering: Rendering, draws: Vec<(Call, Vertices)> },
+    Fill {
+        buffer: Target,
+        offset: u64,
+        bytes: u64,
+        word: u32,
+    },
+    Dispatch {
+        call: Call,
+        groups: Groups,
+    },
+    Render {
+        rendering: Rendering,
+        draws: Vec<(Call, Vertices)>,
+    },
 }
 
 /// Work groups of a dispatch.

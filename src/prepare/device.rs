@@ -119,7 +119,7 @@ impl From<PrepareError> for Error {
     fn from(e: PrepareError) -> Error {
         match e {
             PrepareError::Radius(r) => Error::parameter("particle radius", r, RADIUS_REMEDY),
-            PrepareError::Option { name, value, must } => Error::parameter(name, value, format!("it must be {must}")),
+            PrepareError::Option { name, value, remedy } => Error::parameter(name, value, remedy),
             other => Error::parameter("particles", "", other.to_string()),
         }
     }

@@ -66,8 +66,8 @@ pub enum PrepareError {
     )]
     Radius(f32),
     /// An option out of its range.
-    #[error("option {name} = {value}: it must be {must}")]
-    Option { name: &'static str, value: f32, must: &'static str },
+    #[error("{name} is {value}: {remedy}")]
+    Option { name: &'static str, value: String, remedy: String },
     /// A position that is not finite.
     #[error("particle {index} at {position} is not finite: remove it")]
     Position { index: usize, position: Vec3 },

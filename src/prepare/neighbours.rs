@@ -16,15 +16,16 @@ pub type Cell = [i32; 3];
 /// several cells apart, and an `f64` quotient no longer decides `floor` safely.
 const FURTHEST_CELL: f64 = (1u32 << 28) as f64;
 
-/// How candidates are found. Both give the same neighbours in the same order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Search {
-    /// Sort the `n` particles by cell and look up the runs of the cells around. Faster on every
-    /// scene measured, and frugal.
-    #[default]
-    Runs,
-    /// Im16 §III: sort 27 `n` (cell, particle) entries, so that one run holds all candidates.
-    Relation,
+crate::parameters::choices! {
+    /// How candidates are found. Both give the same neighbours in the same order.
+    pub enum Search {
+        /// Sort the `n` particles by cell and look up the runs of the cells around. Faster on every
+        /// scene measured, and frugal.
+        #[default]
+        Runs = "runs",
+        /// Im16 §III: sort 27 `n` (cell, particle) entries, so that one run holds all candidates.
+        Relation = "relation",
+    }
 }
 
 /// A neighbour, or in a crowd one of several that it stands for.

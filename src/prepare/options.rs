@@ -2,40 +2,34 @@
 
 use super::PrepareError;
 use super::neighbours::Search;
-use crate::space;
+use crate::{
+    Error, Parameters,
+    parameters::{Value, parameters},
+    space,
+};
 
-/// What can be chosen; the defaults suit SPH frames with a support of four radii.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
-    /// Smoothing radius h in world units, 2 to 64 radii; 4 radii if `None`.
-    pub support: Option<f32>,
-    /// τ: a particle of lower ρ/ρ0 is a splash (Imai16 §4.1). At rest spacing and the default
-    /// support a lone particle has 0.32, a pair 0.40, a row or a triangle 0.478, a corner 0.61, a
-    /// sheet one particle thin 0.70, an edge 0.72, a flat surface 0.85.
-    pub splash_threshold: f32,
-    /// λ: how far a centre moves to its neighbours' mean, 0 to 1 (YuTurk13).
-    pub smoothing: f32,
-    /// k_r: the largest ratio of two semi-axes, at least 1 (YuTurk13).
-    pub max_ratio: f32,
-    /// A body particle with this many neighbours or fewer stays a sphere (YuTurk13).
-    pub min_neighbours: usize,
-    /// Longest semi-axis, in particle radii (Imai16 §4.2).
-    pub max_semi_axis: f32,
-    /// How neighbours are found; the result is the same.
-    pub search: Search,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            support: None,
-            splash_threshold: 0.48,
-            smoothing: 0.9,
-            max_ratio: 4.0,
-            min_neighbours: 25,
-            max_semi_axis: 1.2,
-            search: Search::Runs,
-        }
+parameters! {
+    []
+    /// What can be chosen; the defaults suit SPH frames with a support of four radii.
+    ///
+    /// At rest spacing and the default support a lone particle has 0.32 of a filled body's density, a pair 0.40, a row or a
+    /// triangle 0.478, a corner 0.61, a sheet one particle thin 0.70, an edge 0.72, a flat surface 0.85.
+    pub struct Options {
+        /// Smoothing radius h
+        support: Option<f32> = None, "world units", "2 to 64 radii, or none for 4 radii"
+            => |h| h.is_none_or(|h| h.is_finite() && h > 0.0);
+        /// Particles with less than this share of a filled body's density are splash: τ (Imai16 §4.1)
+        splash_threshold: f32 = 0.48, "", "a number" => |t| !t.is_nan();
+        /// How far a centre moves to its neighbours' mean: λ (YuTurk13)
+        smoothing: f32 = 0.9, "", "0 to 1" => |s| (0.0..=1.0).contains(s);
+        /// Largest ratio of two semi-axes: k_r (YuTurk13)
+        max_ratio: f32 = 4.0, "", "1 to 1000" => |r| (1.0..=1e3).contains(r);
+        /// A body particle with this many neighbours or fewer stays a sphere (YuTurk13)
+        min_neighbours: usize = 25, "", "0 to 1000000" => |n| *n <= 1_000_000;
+        /// Longest semi-axis (Imai16 §4.2)
+        max_semi_axis: f32 = 1.2, "particle radii", "0.01 to 100" => |a| (0.01..=100.0).contains(a);
+        /// How neighbours are found; the result is the same
+        search: Search = Search::Runs, "", "runs or relation (Im16's table)" => |_| true;
     }
 }
 
@@ -52,23 +46,25 @@ impl Scale {
         if !space::RADII.contains(&radius) {
             return Err(PrepareError::Radius(radius));
         }
+        options.validate()?;
         let support = options.support.unwrap_or(4.0 * radius);
-        let check = |valid, name, value, must| {
-            if valid { Ok(()) } else { Err(PrepareError::Option { name, value, must }) }
-        };
-        let Options { splash_threshold, smoothing, max_ratio, max_semi_axis, .. } = *options;
-        let relative = support / radius;
-        check((2.0..=64.0).contains(&relative), "support", support, "2 to 64 radii")?;
-        check(!splash_threshold.is_nan(), "splash_threshold", splash_threshold, "a number")?;
-        check((0.0..=1.0).contains(&smoothing), "smoothing", smoothing, "0 to 1")?;
-        check((1.0..=1e3).contains(&max_ratio), "max_ratio", max_ratio, "1 to 1000")?;
-        let long = (0.01..=100.0).contains(&max_semi_axis);
-        check(long, "max_semi_axis", max_semi_axis, "0.01 to 100 radii")?;
+        if !(2.0..=64.0).contains(&(support / radius)) {
+            return Err(Error::parameter("support", support.text(), "use 2 to 64 radii").into());
+        }
         Ok(Self { radius: f64::from(radius), support: f64::from(support) })
     }
 
     /// Within what distance neighbours shape an ellipsoid (YuTurk13: 2 h).
     pub fn reach(self) -> f64 {
         2.0 * self.support
+    }
+}
+
+impl From<Error> for PrepareError {
+    fn from(e: Error) -> PrepareError {
+        match e {
+            Error::Parameter { parameter, value, remedy } => PrepareError::Option { name: parameter, value, remedy },
+            other => PrepareError::Option { name: "options", value: String::new(), remedy: other.to_string() },
+        }
     }
 }

@@ -5,6 +5,8 @@ mod drivers;
 mod outputs;
 mod refusals;
 mod render;
+mod scenes;
+mod settings;
 mod signals;
 mod terminal;
 

@@ -96,7 +96,7 @@ fn a_dump_replaces_a_dump_and_nothing_else() {
     run.succeeds(&render(&block, &["-o", "out.png", "--dump", "d"]), &all);
     let first = listing(&run.path("d"));
     assert!(first.contains(&"body_back_depth.npy".to_owned()));
-    run.succeeds(&render(&block, &["-o", "out.png", "--dump", "d/", "--refractions", "1"]), &all);
+    run.succeeds(&render(&block, &["-o", "out.png", "--dump", "d/", "--optics", "one"]), &all);
     let second = listing(&run.path("d"));
     assert!(!second.iter().any(|n| n.contains("back")), "maps of the older dump: {second:?}");
     // Parents that are missing are made; an empty folder is as good as none.

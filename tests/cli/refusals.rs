@@ -47,11 +47,30 @@ fn bad_parameters_are_refused() {
     refuse(2, &["--size", "64"], &["WIDTHxHEIGHT"]);
     refuse(2, &["--eye", "1,2"], &["three finite numbers"]);
     refuse(2, &["--supersample", "4"], &["supersample"]);
-    refuse(1, &["--refractions", "3"], &["refractions", "1, 2 or 4"]);
+    refuse(2, &["--refractions", "2"], &["refractions"]);
+    refuse(2, &["--optics", "three"], &["optics", "four", "one"]);
+    refuse(2, &["--method", "imai"], &["method", "imai16"]);
+    refuse(2, &["--iterations", "-1"], &["iterations", "0 to 20"]);
+    refuse(2, &["--absorption", "1,2"], &["absorption", "three finite"]);
+    refuse(2, &["--weighting", "none"], &["weighting", "euclidean"]);
+    refuse(2, &["--occlusion-culling", "no"], &["occlusion-culling", "false"]);
+    refuse(1, &["--max-ratio", "0.5"], &["max_ratio", "1 to 1000"]);
+    refuse(1, &["--support", "1e-9"], &["support", "2 to 64 radii"]);
+    refuse(1, &["--splash-threshold", "nan"], &["splash_threshold", "a number"]);
+    refuse(2, &["--min-neighbours", "-3"], &["min-neighbours", "0 to"]);
+    refuse(2, &["--search", "nowhere"], &["search", "runs", "relation"]);
     refuse(1, &["--window", "8"], &["window", "odd"]);
     refuse(1, &["--window", "27"], &["window", "25"]);
+    refuse(1, &["--window", "11", "--supersample", "3"], &["window is 11", "--supersample 3", "9 at most"]);
+    refuse(
+        1,
+        &["--smooth", "none", "--window", "7"],
+        &["window is 7", "smooth none", "leave --window out", "--smooth plane-fit"],
+    );
+    refuse(1, &["--optics", "one", "--internal-reflections", "2"], &["--optics four or --optics two"]);
+    refuse(1, &["--env-rotate", "nan"], &["environment rotation"]);
     refuse(1, &["--sigma", "0"], &["sigma"]);
-    refuse(1, &["--ior", "1"], &["index of refraction"]);
+    refuse(1, &["--ior", "1"], &["ior", "above 1"]);
     refuse(1, &["--absorption", "-1,0,0"], &["absorption"]);
     refuse(1, &["--fov-y", "180"], &["fov-y"]);
     refuse(1, &["--up", "0,0,0"], &["up"]);

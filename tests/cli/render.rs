@@ -103,7 +103,7 @@ fn only_what_a_scene_needs_is_there() {
     let (names, passes, less) = memory(&["--splash-threshold", "0"]);
     assert!(!names.iter().chain(&passes).any(|n| n.contains("splash")), "{names:?} {passes:?}");
     assert!(less < total);
-    let (_, passes, front_only) = memory(&["--refractions", "1"]);
+    let (_, passes, front_only) = memory(&["--optics", "one"]);
     assert!(!passes.iter().any(|p| p.contains("back")), "{passes:?}");
     assert!(front_only < total);
 }
@@ -170,8 +170,7 @@ fn no_particles_give_the_background_and_say_so() {
 #[test]
 fn exr_and_supersampling_work() {
     let run = Run::new();
-    let output =
-        run.command(&["render", "-o", "out.exr", "--size", "64x48", "--supersample", "3", "--refractions", "2"]);
+    let output = run.command(&["render", "-o", "out.exr", "--size", "64x48", "--supersample", "3", "--optics", "two"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let picture = image::open(run.path("out.exr")).expect("an EXR").to_rgb32f();
     assert_eq!(picture.dimensions(), (64, 48));

@@ -84,10 +84,13 @@ fn nothing_reaches_the_terminal_unescaped_or_unbounded() {
         &["render", "-o", &folder],
         &["render", "-o", evil],
         &["render", "-o", "out.png", "--device", evil],
-        &["render", "-o", "out.png", "--refractions", evil],
+        &["render", "-o", "out.png", "--iterations", evil],
         &["render", "-o", "out.png", "--size", evil],
         &["render", "-o", "out.png", "--eye", evil],
         &["render", "-o", "out.png", "--fresnel", evil],
+        &["render", "-o", "out.png", "--absorption", evil],
+        &["render", "-o", "out.png", "--method", evil],
+        &["render", "-o", "out.png", "--scene", evil],
         &[evil],
     ] {
         let output = run.command(args);
@@ -122,14 +125,14 @@ fn a_picture_without_the_liquid_is_said() {
         String::from_utf8_lossy(&output.stderr).into_owned()
     };
     assert_eq!(render(&[]), "");
-    assert_eq!(render(&["--prepare", "gpu", "--refractions", "1"]), "");
+    assert_eq!(render(&["--prepare", "gpu", "--optics", "one"]), "");
     for prepare in ["cpu", "gpu"] {
         let said = |more: &[&str]| render(&[more, &["--prepare", prepare]].concat());
         let behind = said(&["--eye", "0,0,5", "--target", "0,0,9"]);
         assert!(behind.contains("no liquid in the picture") && behind.contains("behind the eye"), "{behind}");
         let beside = said(&["--eye", "0,0,5", "--target", "9,0,4"]);
         assert!(beside.contains("outside the view"), "{beside}");
-        let tiny = said(&["--eye", "0,0,9e4", "--target", "0,0,0", "--refractions", "1"]);
+        let tiny = said(&["--eye", "0,0,9e4", "--target", "0,0,0", "--optics", "one"]);
         assert!(tiny.contains("of a pixel wide"), "{tiny}");
     }
 }

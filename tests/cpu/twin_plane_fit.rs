@@ -1,12 +1,12 @@
 //! Plane fitting (Imai16 §4.3) against what its formulas promise, on maps with closed forms.
 
 use glam::{DVec3, Vec3};
+use meniscus::inspect::uniforms;
 use meniscus::shader::Frame;
+use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
 use meniscus::space::Space;
 use meniscus::twin::normal::{decode_normal, encode_normal};
 use meniscus::smooth::plane_fit::twin::{Fit, Outcome, plane_fit, view_ray};
-use meniscus::inspect::uniforms;
-use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
 use meniscus::{Camera, Settings};
 
 const SIZE: [u32; 2] = [61, 47];

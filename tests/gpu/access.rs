@@ -3,8 +3,8 @@
 use crate::support::{Choose, camera, each_driver, random_cloud};
 use ash::vk::{self, AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};
 use glam::Vec3;
-use meniscus::inspect::{Access, State};
 use meniscus::host::{Gpu, HostError, Instance, Session};
+use meniscus::inspect::{Access, State};
 use meniscus::{Equirect, FrameInput, Settings};
 
 /// Every target that a pass reads: the pass, the target, the stage that wrote it, the stage that reads it. Of several
@@ -58,12 +58,7 @@ fn a_frame_has_a_barrier_before_every_read() {
                     e.pass == pass && e.resource == id && stages && flushed
                 });
                 let text = plan.iter().map(|e| format!("{e}\n")).collect::<String>();
-                assert!(
-                    found,
-                    "{}: no barrier from {writer:?} before {pass} reads {}:\n{text}",
-                    driver.name,
-                    id
-                );
+                assert!(found, "{}: no barrier from {writer:?} before {pass} reads {}:\n{text}", driver.name, id);
             }
         }
         // Those who read the print see the same.

@@ -122,7 +122,8 @@ pub struct Pixel {
 }
 
 pub fn pixels(case: &Case, shot: &Shot) -> Vec<Pixel> {
-    let (walk, direction) = (shot.floats("walk (debug)", 0).unwrap(), shot.floats("final direction (debug)", 0).unwrap());
+    let (walk, direction) =
+        (shot.floats("walk (debug)", 0).unwrap(), shot.floats("final direction (debug)", 0).unwrap());
     let numbers = walk.iter().chain(&direction).chain(shot.picture.as_flattened());
     assert!(numbers.into_iter().all(|v| v.is_finite()), "not finite");
     let to_world = case.camera.view.as_dmat4().inverse();

@@ -9,7 +9,8 @@ use meniscus::{twin::compact::compact};
 
 /// The lists as the splat pass reads them: `[2 * class + side]`.
 fn lists(shot: &Shot) -> [Vec<u32>; 4] {
-    let (drawn, draws) = (shot.words("drawn particles", 0).expect("drawn"), shot.words("indirect draws", 0).expect("draws"));
+    let (drawn, draws) =
+        (shot.words("drawn particles", 0).expect("drawn"), shot.words("indirect draws", 0).expect("draws"));
     let count = shot.words("visible particles", 0).expect("visible").len();
     std::array::from_fn(|l| {
         let draw = &draws[8 * l..][..8];

@@ -64,7 +64,8 @@ pub fn around_the_near_plane() -> Case {
 
 /// Verdicts of one class as the GPU has them.
 fn verdicts(shot: &Shot, particles: &Particles, class: u32) -> Vec<u32> {
-    let (splash, body) = shot.words("visible particles", 0).expect("there are particles").split_at(particles.splash_count);
+    let (splash, body) =
+        shot.words("visible particles", 0).expect("there are particles").split_at(particles.splash_count);
     let (words, mark) = if class == CLASS_SPLASH { (splash, 0) } else { (body, VISIBLE_BODY) };
     assert!(words.iter().all(|v| *v == 0 || v & VISIBLE_BODY == mark), "every particle knows its class");
     words.iter().map(|v| v & (VISIBLE_FRONT | VISIBLE_BACK)).collect()

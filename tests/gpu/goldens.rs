@@ -107,7 +107,8 @@ const TINTED: Vec3 = Vec3::new(2.0, 0.7, 0.3);
 
 fn dam_break(refractions: u32, internal_reflections: u32) -> Case {
     let case = crate::splat::dam_break();
-    let mut settings = Settings::default().refractions(refractions).reflections(internal_reflections).absorption(TINTED);
+    let mut settings =
+        Settings::default().refractions(refractions).reflections(internal_reflections).absorption(TINTED);
     settings.set("fresnel", "exact").expect("a parameter");
     Case { settings, size: SIZE, ..case.clone() }
 }

@@ -13,7 +13,11 @@ const TOLERANCE: f64 = 0.02;
 /// Returns how many pixels kept the ray-cast normal.
 fn check(driver: &Driver, name: &str, case: &Case) -> u32 {
     let shot = driver.shoot(case);
-    let smoothed = if case.settings.fit().iterations % 2 == 1 { "body depth (smoothed, odd)" } else { "body depth (smoothed, even)" };
+    let smoothed = if case.settings.fit().iterations % 2 == 1 {
+        "body depth (smoothed, odd)"
+    } else {
+        "body depth (smoothed, even)"
+    };
     let (mut degenerate, mut seen) = (0, 0u32);
     let (mut off, mut ties) = (0u32, 0u32);
     for layer in 0..2 {

@@ -17,7 +17,8 @@ const ROUNDING: f64 = DEPTH_ROUNDING as f64;
 
 /// Front and back bounds as the GPU has them.
 fn bounds(shot: &Shot) -> (Vec<f64>, Vec<f64>) {
-    let all: Vec<f64> = shot.floats("body depth bounds", 0).expect("there is a body").into_iter().map(f64::from).collect();
+    let all: Vec<f64> =
+        shot.floats("body depth bounds", 0).expect("there is a body").into_iter().map(f64::from).collect();
     let half = all.len() / 2;
     (all[..half].to_vec(), all[half..].to_vec())
 }
@@ -48,7 +49,8 @@ fn check(driver: &Driver, case: &Case, what: &str, bounded_at_least: f64) -> Sho
     assert!(bounded as f64 >= bounded_at_least * front.len() as f64, "{}: {what}: {bounded}", driver.name);
 
     // Safe: whatever is drawn in front is at least as near, and what is drawn behind at least as far.
-    let (nearest, farthest) = (shot.floats("body depth (ray-cast)", 0).unwrap(), shot.floats("body depth (ray-cast)", 1).unwrap());
+    let (nearest, farthest) =
+        (shot.floats("body depth (ray-cast)", 0).unwrap(), shot.floats("body depth (ray-cast)", 1).unwrap());
     for i in (0..front.len()).filter(|i| front[*i].is_finite()) {
         let (nearest, farthest) = (f64::from(nearest[i].abs()), f64::from(farthest[i]));
         let label = format!("{}: {what}: pixel {i}", driver.name);

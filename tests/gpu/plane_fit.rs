@@ -27,12 +27,10 @@ struct Seen {
 
 /// Settings for these tests: cheap optics, which come after what is tested, and both sides.
 fn settings(window: u32, iterations: u32, sigma: f32, weighting: Weighting) -> Settings {
-    {
     let mut settings = Settings::default().refractions(2).reflections(0);
     let fit = PlaneFit::default().window(window).iterations(iterations).sigma(sigma).weighting(weighting);
     settings.method.smooth = fit.into();
     settings
-}
 }
 
 /// Compares one iteration on both layers, from image `from` of one shot to image `to` of another (or the same one).
@@ -112,7 +110,12 @@ fn check_two(driver: &Driver, name: &str, case: &Case) -> Shot {
     let shot = driver.shoot(case);
     let seen = [
         compare(&format!("{label}, first"), s, (&shot, "body depth (ray-cast)"), (&shot, "body depth (smoothed, odd)")),
-        compare(&format!("{label}, second"), s, (&shot, "body depth (smoothed, odd)"), (&shot, "body depth (smoothed, even)")),
+        compare(
+            &format!("{label}, second"),
+            s,
+            (&shot, "body depth (smoothed, odd)"),
+            (&shot, "body depth (smoothed, even)"),
+        ),
     ];
     assert_counted(&label, counters(&shot), &seen);
     let fitted = seen.iter().map(|s| s.fitted).sum::<usize>();
@@ -246,11 +249,16 @@ fn normals_that_cancel() {
             eye_inside: false,
         };
         let shot = driver.shoot(&case);
-        let seen = compare(&driver.name, &case.settings.fit(), (&shot, "body depth (ray-cast)"), (&shot, "body depth (smoothed, odd)"));
+        let seen = compare(
+            &driver.name,
+            &case.settings.fit(),
+            (&shot, "body depth (ray-cast)"),
+            (&shot, "body depth (smoothed, odd)"),
+        );
         assert_counted(&driver.name, counters(&shot), &[seen]);
         assert_eq!(counters(&shot)[0], 2, "{}: the middle pixels of the front", driver.name);
-        let [raw, fitted] =
-            ["body depth (ray-cast)", "body depth (smoothed, odd)"].map(|id| shot.words(id, 0).unwrap()[4 * 8 + 3..][..2].to_vec());
+        let [raw, fitted] = ["body depth (ray-cast)", "body depth (smoothed, odd)"]
+            .map(|id| shot.words(id, 0).unwrap()[4 * 8 + 3..][..2].to_vec());
         assert_eq!(raw, fitted);
     });
 }

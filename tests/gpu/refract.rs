@@ -78,7 +78,8 @@ impl Pair {
 
 /// Every pixel of a frame, or every fourth: the twin's march is slow.
 fn pairs(driver: &Driver, case: &Case, shot: &Shot, scene: Option<Scene>, sky: &Equirect) -> Vec<Pair> {
-    let (walks, directions) = (shot.floats("walk (debug)", 0).unwrap(), shot.floats("final direction (debug)", 0).unwrap());
+    let (walks, directions) =
+        (shot.floats("walk (debug)", 0).unwrap(), shot.floats("final direction (debug)", 0).unwrap());
     let numbers = walks.iter().chain(&directions).chain(shot.picture.as_flattened());
     assert!(numbers.into_iter().all(|v| v.is_finite()), "{}: not finite", driver.name);
     let own = OwnMaps::of(case, shot);
@@ -254,10 +255,11 @@ pub fn compare_before(driver: &Driver, case: &Case, painted: &Painted, backgroun
 
 fn optics(refractions: u32, internal_reflections: u32, fresnel: Fresnel, absorption: Vec3) -> Settings {
     {
-    let mut settings = Settings::default().refractions(refractions).reflections(internal_reflections).absorption(absorption);
-    settings.set("fresnel", if fresnel == Fresnel::Exact { "exact" } else { "schlick" }).expect("a parameter");
-    settings
-}
+        let mut settings =
+            Settings::default().refractions(refractions).reflections(internal_reflections).absorption(absorption);
+        settings.set("fresnel", if fresnel == Fresnel::Exact { "exact" } else { "schlick" }).expect("a parameter");
+        settings
+    }
 }
 
 const CLEAR: Vec3 = Vec3::ZERO;

@@ -110,7 +110,8 @@ fn agrees(driver: &Driver, name: &str, radius: f32, positions: &[Vec3], options:
     let classes = classify(positions, radius, options, None).expect("classes");
     let label = format!("{}: {name}: {:?}", driver.name, options.search);
     let read = |id| shot.floats(id, 0).expect("prepared");
-    let (centers, diagonals, mixed) = (read("particle centres"), read("particle shapes (diagonal)"), read("particle shapes (mixed)"));
+    let (centers, diagonals, mixed) =
+        (read("particle centres"), read("particle shapes (diagonal)"), read("particle shapes (mixed)"));
     let three = |all: &[f32], k: usize| Vec3::from_slice(&all[3 * k..]);
     // One particle after the other through the CPU's path keeps the input's order.
     let given: Vec<Class> = classes.clone();
@@ -172,7 +173,8 @@ fn positions_may_lie_anywhere_in_a_buffer() {
         let bits = |offset, stride| {
             let cloud = Cloud { offset, stride, ..Cloud::new(&positions, Search::Runs) };
             let shot = driver.shoot_cloud(&empty(radius), &cloud);
-            ["particle centres", "particle shapes (diagonal)", "particle shapes (mixed)"].map(|id| shot.words(id, 0).expect("prepared").to_vec())
+            ["particle centres", "particle shapes (diagonal)", "particle shapes (mixed)"]
+                .map(|id| shot.words(id, 0).expect("prepared").to_vec())
         };
         let want = bits(0, 12);
         for (offset, stride) in [(0, 16), (4, 12), (252, 32), (1040, 48)] {
@@ -254,7 +256,8 @@ fn what_is_not_finite_is_left_out() {
             for slot in ["splash", "body", "ellipsoid_few_neighbours"] {
                 assert_eq!(shot.counter(slot), clean.counter(slot), "{}: {search:?}", driver.name);
             }
-            let nothing = shot.floats("particle shapes (diagonal)", 0).expect("shapes").chunks(3).filter(|d| d[0] == 0.0).count();
+            let nothing =
+                shot.floats("particle shapes (diagonal)", 0).expect("shapes").chunks(3).filter(|d| d[0] == 0.0).count();
             assert_eq!(nothing, holed.len() - finite.len(), "{}: {search:?}", driver.name);
             assert_eq!(listed(&shot, holed.len()).0, neighbours(&holed, 8.0 * radius), "{}: {search:?}", driver.name);
             assert!(shot.picture.iter().flatten().all(|v| v.is_finite()), "{}", driver.name);

@@ -2,7 +2,7 @@
 
 use crate::support::{Case, camera, each_driver, random_cloud};
 use glam::Vec3;
-use meniscus::{Settings};
+use meniscus::Settings;
 
 #[test]
 fn a_random_cloud_renders() {

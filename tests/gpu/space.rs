@@ -139,9 +139,14 @@ fn a_left_handed_world_is_drawn_as_its_mirror_image() {
     left.camera.validate().expect("a reflection is rigid");
     each_driver(|driver| {
         let (a, b) = (driver.shoot(&right), driver.shoot(&left));
-        for id in
-            ["splash depth", "splash normal", "body depth (ray-cast)", "body normal (ray-cast)", "body depth (smoothed, even)", "body normal (smoothed)"]
-        {
+        for id in [
+            "splash depth",
+            "splash normal",
+            "body depth (ray-cast)",
+            "body normal (ray-cast)",
+            "body depth (smoothed, even)",
+            "body normal (smoothed)",
+        ] {
             for layer in 0..2 {
                 assert!(a.words(id, layer) == b.words(id, layer), "{}: {id:?} {layer}", driver.name);
             }

@@ -13,7 +13,8 @@ use meniscus::{
 };
 
 /// Depth and normal target of each class.
-pub const TARGETS: [(&str, &str); 2] = [("splash depth", "splash normal"), ("body depth (ray-cast)", "body normal (ray-cast)")];
+pub const TARGETS: [(&str, &str); 2] =
+    [("splash depth", "splash normal"), ("body depth (ray-cast)", "body normal (ray-cast)")];
 
 /// The particles of one class as the GPU reads them.
 pub fn packed(particles: &Particles, class: u32) -> Vec<Particle> {

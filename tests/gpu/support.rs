@@ -140,7 +140,12 @@ impl<'a> Driver<'a> {
         self.session.borrow().gpu
     }
 
-    fn shoot_input(&self, case: &Case, neighbours: u32, change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>) -> Shot {
+    fn shoot_input(
+        &self,
+        case: &Case,
+        neighbours: u32,
+        change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>,
+    ) -> Shot {
         let session = &mut *self.session.borrow_mut();
         session.renderer.inspect(Inspection { walks: true, neighbours });
         session.resize(case.size).expect("size");

@@ -18,10 +18,12 @@ fn ranges_equal_the_twin() {
         };
         each_driver(|driver| {
             let shot = driver.shoot(&case);
-            let maps: Vec<_> = ["splash depth", "body depth (smoothed, even)"].iter().filter_map(|id| shot.floats(*id, 0)).collect();
+            let maps: Vec<_> =
+                ["splash depth", "body depth (smoothed, even)"].iter().filter_map(|id| shot.floats(*id, 0)).collect();
             let maps: Vec<_> = maps.iter().map(Vec::as_slice).collect();
             let expected = tiles(size, &maps);
-            let (low, high) = (shot.floats("front depth tiles", 0).unwrap(), shot.floats("front depth tiles", 1).unwrap());
+            let (low, high) =
+                (shot.floats("front depth tiles", 0).unwrap(), shot.floats("front depth tiles", 1).unwrap());
             assert_eq!(low.len() as u32, size[0].div_ceil(FRONT_TILE) * size[1].div_ceil(FRONT_TILE));
             let found: Vec<_> = low.into_iter().zip(high).collect();
             assert_eq!(found, expected, "{}: {size:?}", driver.name);

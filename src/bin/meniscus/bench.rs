@@ -1,24 +1,25 @@
 //! `meniscus bench`: what each pass takes, in figures that can be repeated.
 
 use crate::{
-    empty, on,
+    choices, empty, on,
     options::Options,
-    outputs, report,
+    outputs,
+    picture::Picture,
+    report,
     scene::{Prepare, Scene, progress},
     terminal::{self, NotWritten},
 };
 use glam::Vec3;
 use meniscus::{
-    FrameInput, Settings,
+    FrameInput, LedgerEntry, Settings,
     host::{Gpu, Instance, Session},
-    profile::FrameTimes,
-    targets::LedgerEntry,
+    profile::{FrameTimes, PassTime},
 };
-use std::{collections::BTreeMap, path::PathBuf, process::ExitCode};
+use std::{path::PathBuf, process::ExitCode};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Particle files; the built-in scenes if none is named
+    /// Particle files; the scene file's if none is named, or the built-in scenes
     pub files: Vec<PathBuf>,
     /// Also the built-in scenes: the embedded dam break, a block of 100,000 particles, 20,000 droplets
     #[arg(long)]
@@ -31,6 +32,9 @@ pub struct Args {
     pub max_particles: u32,
     #[command(flatten)]
     pub options: Options,
+    /// Measure each scene with each of these methods, and compare them in a table
+    #[arg(long, value_name = "PRESET,...", value_delimiter = ',', conflicts_with = "method", value_parser = choices::presets())]
+    pub methods: Vec<String>,
     /// Frames that are measured
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
@@ -43,8 +47,21 @@ pub struct Args {
 }
 
 impl Args {
-    pub fn prepare(&self) -> Prepare {
-        self.options.prepare.unwrap_or(Prepare::Gpu)
+    /// What is asked for, once for each method, and what the method is called.
+    fn pictures(&self) -> Result<Vec<(String, Picture)>, Box<dyn std::error::Error>> {
+        let mut base = self.options.base()?;
+        // Measured as it is drawn, once.
+        base.supersample = 1;
+        base.prepare.get_or_insert(Prepare::Gpu);
+        if self.methods.is_empty() {
+            let picture = self.options.over(base, None)?;
+            return Ok(vec![(choices::method_name(&picture.settings), picture)]);
+        }
+        let each = self.methods.iter().map(|name| {
+            let picture = self.options.over(base.clone(), choices::preset(name));
+            Ok((name.clone(), picture.map_err(|e| format!("--methods {name}: {e}"))?))
+        });
+        each.collect()
     }
 
     /// Shows a line of figures. Where a file gets them too, the terminal's may be lost.
@@ -53,60 +70,50 @@ impl Args {
     }
 
     /// Refuses what cannot be written, before anything is measured.
-    fn check(&self) -> Result<(), Box<dyn std::error::Error>> {
+    fn check(&self, picture: &Picture) -> Result<(), Box<dyn std::error::Error>> {
         let Some(path) = &self.output else { return Ok(()) };
         report::check_extension(path)?;
-        let mut inputs: Vec<_> = self.files.iter().map(|p| ("a particle file", p.as_path())).collect();
-        inputs.extend(self.options.env.as_deref().map(|p| ("the environment map (--env)", p)));
+        let files = self.files.iter().chain(&picture.particles);
+        let mut inputs: Vec<_> = files.map(|p| ("a particle file", p.as_path())).collect();
+        inputs.extend(self.options.scene.as_deref().map(|p| ("the scene file (--scene)", p)));
+        inputs.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
         Ok(outputs::check(&[("the figures (--output)", path)], None, &inputs)?)
     }
 }
 
-/// What one scene gave.
+/// What one scene gave with one method.
 pub struct Run {
     pub scene: String,
+    pub method: String,
     pub particles: usize,
     pub radius: f32,
     pub prepare_cpu_ms: f64,
     pub settings: Settings,
     /// Each pass's milliseconds, frame by frame, in the order of the frame; passes of one name are summed.
     pub passes: Vec<(String, Vec<f64>)>,
-    /// First to last timestamp, and the sum of the passes, frame by frame.
+    /// The same of each part of the frame.
+    pub parts: Vec<(String, Vec<f64>)>,
+    /// First to last timestamp, the sum of the passes, and of those that prepare particles, frame by frame.
     pub span: Vec<f64>,
     pub sum: Vec<f64>,
+    pub preparation: Vec<f64>,
     pub memory: Vec<LedgerEntry>,
 }
 
 impl Run {
-    /// Milliseconds of the preparation on the device, frame by frame.
-    pub fn preparation(&self) -> Vec<f64> {
-        let of =
-            |i: usize| self.passes.iter().filter(|(n, _)| PREPARATION.contains(&n.as_str())).map(|(_, t)| t[i]).sum();
-        (0..self.span.len()).map(of).collect()
-    }
-
     /// Bytes that grow with the number of particles, for each of them; the positions' own 12 included.
     pub fn bytes_per_particle(&self, on_device: bool) -> f64 {
-        let bytes: u64 = self.memory.iter().filter(|e| PER_PARTICLE.contains(&e.name)).map(|e| e.bytes).sum();
+        let bytes: u64 = self.memory.iter().filter(|e| e.per_particle).map(|e| e.bytes).sum();
         if self.particles == 0 {
             return 0.0;
         }
         bytes as f64 / self.particles as f64 + if on_device { 12.0 } else { 0.0 }
     }
-}
 
-const PREPARATION: [&str; 3] = ["extent", "sort", "shape"];
-const PER_PARTICLE: [&str; 9] = [
-    "sort order",
-    "sorted positions",
-    "last classes",
-    "particle centres",
-    "particle shapes (diagonal)",
-    "particle shapes (mixed)",
-    "visible particles",
-    "prefix sums",
-    "drawn particles",
-];
+    pub fn bytes(&self) -> u64 {
+        self.memory.iter().map(|e| e.bytes).sum()
+    }
+}
 
 /// Particles of the blocks of `--scaling`.
 const SIZES: [u32; 6] = [1_000, 10_000, 100_000, 1_000_000, 4_000_000, 10_000_000];
@@ -115,7 +122,9 @@ const SIZES: [u32; 6] = [1_000, 10_000, 100_000, 1_000_000, 4_000_000, 10_000_00
 pub const SEED: u64 = 1;
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
-    args.check()?;
+    let pictures = args.pictures()?;
+    let picture = &pictures[0].1;
+    args.check(picture)?;
     if args.scaling && args.files.is_empty() && !args.scenes && args.max_particles < SIZES[0] {
         return Err(format!("--max-particles {} leaves no block: use {} or more", args.max_particles, SIZES[0]).into());
     }
@@ -131,7 +140,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
         )
         .into());
     }
-    let environment = args.options.environment(1)?;
+    let environment = picture.environment()?;
     args.show(&format!(
         "device: {} ({}); meniscus {} {}",
         device.name,
@@ -141,8 +150,8 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     ))?;
     let on_device = on(&device);
     let gpu = Gpu::new(&instance, device).map_err(|e| on_device(e.into()))?;
-    let mut session = Session::new(&gpu, args.options.size, &environment).map_err(|e| on_device(e.into()))?;
-    let runs = all(args, &mut session);
+    let mut session = Session::new(&gpu, picture.size, &environment).map_err(|e| on_device(e.into()))?;
+    let runs = all(args, &pictures, &mut session);
     session.end();
     let runs = runs.map_err(on_device)?;
     let growth = args.scaling.then(|| report::growth(&runs));
@@ -152,33 +161,43 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
         ))?;
     }
     if let Some(path) = &args.output {
-        report::write(path, args, &gpu.info, &runs)?;
+        report::write(path, args, picture, &gpu.info, &runs)?;
         args.show(&format!("wrote {}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn all(args: &Args, session: &mut Session) -> Result<Vec<Run>, Box<dyn std::error::Error>> {
-    let place = args.prepare();
+fn all(
+    args: &Args,
+    pictures: &[(String, Picture)],
+    session: &mut Session,
+) -> Result<Vec<Run>, Box<dyn std::error::Error>> {
+    // They differ in their settings alone.
+    let (picture, place) = (&pictures[0].1, pictures[0].1.place());
     let mut runs = Vec::new();
     let mut add = |name: String, scene: Scene| -> Result<(), Box<dyn std::error::Error>> {
-        let run = measure(args, session, name, &scene)?;
-        report::print(&run, args)?;
-        runs.push(run);
-        Ok(())
+        let begin = runs.len();
+        for (method, picture) in pictures {
+            let run = measure(args, session, (&name, method), picture, &scene)?;
+            report::print(&run, args, picture)?;
+            runs.push(run);
+        }
+        Ok(report::compare(&runs[begin..], args)?)
     };
-    for file in &args.files {
-        add(file.display().to_string(), args.options.load(Some(file), place)?)?;
+    let own = picture.particles.iter().filter(|_| args.files.is_empty());
+    let files: Vec<_> = args.files.iter().chain(own).collect();
+    for file in &files {
+        add(file.display().to_string(), picture.load(Some(file), place)?)?;
     }
-    if args.scenes || (args.files.is_empty() && !args.scaling) {
-        add("embedded dam break".into(), args.options.load(None, place)?)?;
-        add("block of 100,000".into(), Scene::synthetic(block(100_000), RADIUS, place)?)?;
-        add("20,000 droplets".into(), Scene::synthetic(droplets(20_000), RADIUS, place)?)?;
+    if args.scenes || (files.is_empty() && !args.scaling) {
+        add("embedded dam break".into(), picture.load(None, place)?)?;
+        add("block of 100,000".into(), Scene::synthetic(block(100_000), RADIUS, picture)?)?;
+        add("20,000 droplets".into(), Scene::synthetic(droplets(20_000), RADIUS, picture)?)?;
     }
     if args.scaling {
         for n in SIZES {
             if n <= args.max_particles {
-                add(format!("block of {n}"), Scene::synthetic(block(n), RADIUS, place)?)?;
+                add(format!("block of {n}"), Scene::synthetic(block(n), RADIUS, picture)?)?;
             }
         }
     }
@@ -219,16 +238,33 @@ fn droplets(count: u32) -> Vec<Vec3> {
     (0..count).map(|_| offset(&mut state, 100.0 * RADIUS)).collect()
 }
 
-fn measure(args: &Args, session: &mut Session, name: String, scene: &Scene) -> Result<Run, Box<dyn std::error::Error>> {
-    let (options, particles) = (&args.options, &scene.particles);
-    let (camera, eye) = options.camera(scene)?;
-    let settings = options.settings(particles, 1)?;
-    let upload = scene.give(args.prepare(), session)?;
-    let input = FrameInput {
-        eye_inside: scene.inside(eye),
-        positions: upload.as_ref().map(|u| scene.on_device(u)),
-        ..FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null())
-    };
+/// Milliseconds of what has one name, frame by frame.
+fn sums(frames: &[FrameTimes], name: impl Fn(&PassTime) -> &str) -> Vec<(String, Vec<f64>)> {
+    let mut all: Vec<(String, Vec<f64>)> = Vec::new();
+    for (i, p) in frames.iter().enumerate().flat_map(|(i, f)| f.passes.iter().map(move |p| (i, p))) {
+        let found = all.iter().position(|(n, _)| n == name(p)).unwrap_or_else(|| {
+            all.push((name(p).to_owned(), vec![0.0; frames.len()]));
+            all.len() - 1
+        });
+        all[found].1[i] += p.ms;
+    }
+    all
+}
+
+fn measure(
+    args: &Args,
+    session: &mut Session,
+    (name, method): (&str, &str),
+    picture: &Picture,
+    scene: &Scene,
+) -> Result<Run, Box<dyn std::error::Error>> {
+    let particles = &scene.particles;
+    let (camera, eye, _) = picture.camera(scene)?;
+    let settings = picture.frame_settings(particles)?;
+    let upload = scene.give(picture.place(), session)?;
+    let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
+    input.eye_inside = scene.inside(eye);
+    input.positions = upload.as_ref().map(|u| scene.on_device(u));
     let bar = progress(u64::from(args.warmup + args.frames), "frames");
     let mut frames: Vec<FrameTimes> = Vec::new();
     for i in 0..args.warmup + args.frames {
@@ -239,30 +275,24 @@ fn measure(args: &Args, session: &mut Session, name: String, scene: &Scene) -> R
         }
     }
     bar.finish_and_clear();
-    if let Some(why) = empty::explain(session, particles, &camera, &settings, options.size)? {
+    if let Some(why) = empty::explain(session, particles, &camera, picture.size)? {
         terminal::complain(format!("meniscus: {name}: {why}"));
     }
-    let mut order = Vec::new();
-    let mut passes: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    for (i, frame) in frames.iter().enumerate() {
-        for p in &frame.passes {
-            let times = passes.entry(p.name.clone()).or_insert_with(|| {
-                order.push(p.name.clone());
-                vec![0.0; frames.len()]
-            });
-            times[i] += p.ms;
-        }
-    }
-    let passes = order.into_iter().map(|n| (n.clone(), passes[&n].clone())).collect();
+    let total = |f: &FrameTimes, preparing: bool| {
+        f.passes.iter().filter(|p| p.prepares || !preparing).map(|p| p.ms).sum::<f64>()
+    };
     Ok(Run {
-        scene: name,
+        scene: name.to_owned(),
+        method: method.to_owned(),
         particles: scene.positions.len(),
         radius: scene.particles.radius,
-        prepare_cpu_ms: if args.prepare().on_device() { 0.0 } else { scene.prepare_ms },
+        prepare_cpu_ms: if picture.place().on_device() { 0.0 } else { scene.prepare_ms },
         settings,
-        passes,
+        passes: sums(&frames, |p| &p.name),
+        parts: sums(&frames, |p| p.part),
         span: frames.iter().map(|f| f.span_ms).collect(),
-        sum: frames.iter().map(|f| f.passes.iter().map(|p| p.ms).sum()).collect(),
+        sum: frames.iter().map(|f| total(f, false)).collect(),
+        preparation: frames.iter().map(|f| total(f, true)).collect(),
         memory: session.renderer.memory(),
     })
 }

@@ -2,36 +2,67 @@
 
 use glam::{DVec3, Vec3};
 use meniscus::{Camera, Ellipsoid, Error, Particles};
+use serde::{Deserialize, Serialize};
 
-/// What the command line says about the camera; world units, in the file's coordinates.
+/// What is said about the camera; world units, in the file's coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct View {
+    /// Chosen to frame the liquid if there is none.
     pub eye: Option<DVec3>,
+    /// The middle of the liquid if there is none.
     pub target: Option<DVec3>,
+    /// Up, for the camera and the environment.
     pub up: DVec3,
-    pub fov_y_deg: f32,
+    /// Vertical field of view in degrees.
+    pub fov_y: f32,
 }
 
-/// The camera, and its eye, in coordinates relative to `origin`. What is not given is chosen so that the
-/// liquid fills the view.
+impl Default for View {
+    fn default() -> View {
+        View { eye: None, target: None, up: DVec3::Y, fov_y: 40.0 }
+    }
+}
+
+impl View {
+    /// Checks what can be checked without the liquid.
+    pub fn validate(&self) -> Result<(), Error> {
+        if !(self.fov_y > 0.0 && self.fov_y < 170.0) {
+            return Err(wrong("fov-y", self.fov_y.to_string(), "use degrees above 0 and below 170"));
+        }
+        // Of a vector too long for its length to be a number the direction is nothing.
+        if !self.up.normalize().is_normalized() {
+            return Err(wrong("up", self.up.to_string(), "use a finite direction that is not zero"));
+        }
+        for (name, point) in [("eye", self.eye), ("target", self.target)] {
+            if let Some(point) = point.filter(|p| !p.is_finite()) {
+                return Err(wrong(name, point.to_string(), "use a finite point"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The camera, and its eye, in coordinates relative to `origin`; and the view with nothing left open. What is not given is
+/// chosen so that the liquid fills the view.
 pub fn frame(
     view: &View,
     origin: DVec3,
     particles: &Particles,
     aspect: f32,
     near: f32,
-) -> Result<(Camera, Vec3), Error> {
-    if !(view.fov_y_deg > 0.0 && view.fov_y_deg < 170.0) {
-        return Err(wrong("fov-y", view.fov_y_deg.to_string(), "use degrees above 0 and below 170"));
-    }
+) -> Result<(Camera, Vec3, View), Error> {
+    view.validate()?;
     let up = view.up.normalize();
-    if !up.is_finite() {
-        return Err(wrong("up", view.up.to_string(), "use a finite direction that is not zero"));
-    }
-    let fov = view.fov_y_deg.to_radians();
+    let fov = view.fov_y.to_radians();
     let local = |p: DVec3| p - origin;
     let (fit_eye, fit_target) = fit(up, f64::from(fov), f64::from(aspect), particles);
-    let target = view.target.map_or(fit_target, local);
-    let eye = view.eye.map_or(fit_eye + (target - fit_target), local);
+    let whole_target = view.target.unwrap_or(fit_target + origin);
+    let target = local(whole_target);
+    let whole_eye = view.eye.unwrap_or(fit_eye + (target - fit_target) + origin);
+    // By way of the file's coordinates also where it was chosen here: given as such it is the same eye.
+    let eye = local(whole_eye);
+    let whole = View { eye: Some(whole_eye), target: Some(whole_target), ..*view };
     let apart = (target - eye).normalize_or_zero();
     if !(eye.as_vec3().is_finite() && target.as_vec3().is_finite()) || apart == DVec3::ZERO {
         return Err(wrong("eye and target", format!("{eye} and {target}"), "use two different finite points"));
@@ -42,7 +73,7 @@ pub fn frame(
     let ahead = (eye + apart * eye.length().max((target - eye).length())).as_vec3();
     let mut camera = Camera::look_at(eye.as_vec3(), ahead, screen_up.as_vec3(), fov, aspect, near);
     camera.up = up.as_vec3();
-    Ok((camera, eye.as_vec3()))
+    Ok((camera, eye.as_vec3(), whole))
 }
 
 fn wrong(parameter: &'static str, value: String, remedy: &str) -> Error {

@@ -1,44 +1,50 @@
 //! `--dump`: every intermediate target as .npy, so that any pass can be recomputed from the dump alone.
 
-use crate::{codes, options, outputs::Dump, render::Job};
+use crate::{choices, codes, options, outputs::Dump, render::Job};
 use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     host::Session,
+    inspect::{self, Walk},
     shader::{SIDE_BACK, SIDE_FRONT},
+    smooth::Smooth,
     space::Space,
-    targets::Id,
     twin::normal::decode_normal,
 };
 use npyz::WriterBuilder;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::{collections::BTreeMap, error::Error, path::Path};
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     let out = Folder { dump: Dump::new(folder)?, size: job.size, radius: job.scene.particles.radius };
-    let needs = session.renderer.needs(&job.settings, true);
-    let smooth = (needs.body_depth(), needs.body_normal());
+    let surfaces = session.renderer.surfaces();
     let targets = [
-        ("splash", "_raw", Id::SplashDepth, Id::SplashNormal),
-        ("body", "_raw", Id::BodyDepthRaw, Id::BodyNormalRaw),
-        ("body", "", smooth.0, smooth.1),
+        ("splash", "_raw", surfaces.splash_depth, surfaces.splash_normal),
+        ("body", "_raw", Some("body depth (ray-cast)"), Some("body normal (ray-cast)")),
+        ("body", "", surfaces.body_depth, surfaces.body_normal),
     ];
     for (class, raw, depth, normal) in targets {
         for (side, layer) in [("front", SIDE_FRONT), ("back", SIDE_BACK)] {
-            let (Some(depths), Some(normals)) = (session.words(depth, layer)?, session.words(normal, layer)?) else {
-                continue;
-            };
-            out.maps(&format!("{class}_{side}"), raw, &depths, &normals)?;
+            let mut words = |name: Option<&'static str>| name.map_or(Ok(None), |name| session.words(name, layer));
+            let (Some(depths), normals) = (words(depth)?, words(normal)?) else { continue };
+            out.maps(&format!("{class}_{side}"), raw, &depths, normals.as_deref())?;
         }
     }
-    let walk = floats(session.words(Id::Walk, 0)?);
-    for (k, name) in ["pattern", "outcome", "hits", "path_length"].into_iter().enumerate() {
-        let unit = if name == "path_length" { out.radius } else { 1.0 };
-        out.array(name, 1, walk.chunks_exact(4).map(|w| w[k] * unit))?;
+    if let Some(words) = session.words("thickness", 0)? {
+        out.array("thickness", 1, words.into_iter().map(|w| f32::from_bits(w) * out.radius))?;
     }
-    let direction = floats(session.words(Id::Direction, 0)?);
-    out.array("final_direction", 3, direction.chunks_exact(4).flat_map(|d| [d[0], d[1], d[2]]))?;
+    // Not all optics walk.
+    if let Some(words) = session.words("walk (debug)", 0)? {
+        let walk = floats(words);
+        for (k, name) in ["pattern", "outcome", "hits", "path_length"].into_iter().enumerate() {
+            let unit = if name == "path_length" { out.radius } else { 1.0 };
+            out.array(name, 1, walk.chunks_exact(4).map(|w| w[k] * unit))?;
+        }
+    }
+    if let Some(words) = session.words("final direction (debug)", 0)? {
+        out.array("final_direction", 3, floats(words).chunks_exact(4).flat_map(|d| [d[0], d[1], d[2]]))?;
+    }
     out.array("color_linear", 3, session.picture()?.into_iter().flatten())?;
     out.dump.write("particles.npz", &particles(job)?)?;
     if job.args.dump_neighbours {
@@ -48,8 +54,8 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     Ok(out.dump.finish()?)
 }
 
-fn floats(words: Option<Vec<u32>>) -> Vec<f32> {
-    words.unwrap_or_default().into_iter().map(f32::from_bits).collect()
+fn floats(words: Vec<u32>) -> Vec<f32> {
+    words.into_iter().map(f32::from_bits).collect()
 }
 
 struct Folder<'a> {
@@ -67,9 +73,10 @@ impl Folder<'_> {
         Ok(self.dump.write(&format!("{name}.npy"), &npy(shape, data)?)?)
     }
 
-    fn maps(&self, surface: &str, raw: &str, depths: &[u32], normals: &[u32]) -> Result<()> {
+    fn maps(&self, surface: &str, raw: &str, depths: &[u32], normals: Option<&[u32]>) -> Result<()> {
         let depth = |w: &u32| Some(self.radius * f32::from_bits(*w)).filter(|d| *d > 0.0);
         self.array(&format!("{surface}_depth{raw}"), 1, depths.iter().map(|w| depth(w).unwrap_or(f32::NAN)))?;
+        let Some(normals) = normals else { return Ok(()) };
         let normal = depths.iter().zip(normals).flat_map(|(d, n)| match depth(d) {
             Some(_) => decode_normal(*n).to_array(),
             None => [f32::NAN; 3],
@@ -138,15 +145,24 @@ fn world_view(view: Mat4, origin: DVec3) -> DMat4 {
 }
 
 /// All that is needed to recompute the dump.
-pub fn frame(job: &Job) -> serde_json::Value {
+pub fn frame(job: &Job) -> Value {
     let (s, radius) = (&job.settings, job.scene.particles.radius);
     let codes =
         |table: &[(u32, &'static str)]| table.iter().map(|(c, t)| (c.to_string(), *t)).collect::<BTreeMap<_, _>>();
     let bounds = job.scene.particles.bounds().unwrap_or_default();
     // In radii, whatever the origin.
-    let frame = job.camera.uniforms(s, job.size, &Space::new(radius, Vec3::ZERO), bounds);
-    let tolerance = meniscus::twin::search::Tolerance::of(&frame);
-    json!({
+    let block = inspect::uniforms(&job.camera, s, job.size, &Space::new(radius, Vec3::ZERO), bounds);
+    let tolerance = meniscus::twin::search::Tolerance::of(&block);
+    let guards = match s.method.smooth {
+        Smooth::PlaneFit(p) => json!({
+            "grazing": meniscus::shader::FIT_GRAZING_LIMIT,
+            "update": meniscus::shader::FIT_UPDATE_LIMIT * p.sigma * radius,
+            "meaning": "the old depth is kept where |n.v| (v unit) is below `grazing` or the update exceeds `update`",
+        }),
+        _ => Value::Null,
+    };
+    let walk = Walk::of(&s.method.optics);
+    let mut frame = json!({
         "width": job.size[0],
         "height": job.size[1],
         "view": rows(world_view(job.camera.view, job.scene.origin)),
@@ -156,20 +172,12 @@ pub fn frame(job: &Job) -> serde_json::Value {
         "eye_inside": job.eye_inside,
         "origin": job.scene.origin.to_array(),
         "radius": radius,
-        "window": s.window,
-        "iterations": s.iterations,
-        "sigma": s.sigma * radius,
-        "weighting": options::name(&options::WEIGHTING, s.weighting),
-        "plane_fit_guards": {
-            "grazing": meniscus::shader::FIT_GRAZING_LIMIT,
-            "update": meniscus::shader::FIT_UPDATE_LIMIT * s.sigma * radius,
-            "meaning": "the old depth is kept where |n.v| (v unit) is below `grazing` or the update exceeds `update`",
-        },
-        "refractions": s.refractions,
-        "internal_reflections": s.internal_reflections,
-        "fresnel": options::name(&options::FRESNEL, s.fresnel),
-        "ior": s.ior,
-        "absorption": s.absorption.to_array(),
+        "environment_rotation": job.camera.environment_rotation,
+        "settings": choices::record(s),
+        "units": choices::units(s),
+        "asked": job.picture.record(),
+        "plane_fit_guards": guards,
+        "refractions": walk.map(|w| w.refractions),
         "sampling": {
             "jump": radius * tolerance.jump,
             "accepted": radius * tolerance.accepted,
@@ -183,5 +191,14 @@ pub fn frame(job: &Job) -> serde_json::Value {
         "normals": "eye space, outward: fronts towards the viewer, backs away from it",
         "particle_classes": {"0": "splash", "1": "body"},
         "command": options::command(),
-    })
+    });
+    // Each parameter by its name too; instead of lengths in particle radii those in world units.
+    let lengths = choices::lengths(s, radius);
+    let plain = choices::record(s).into_iter().filter(|(name, _)| !lengths.contains_key(&choices::in_world(name)));
+    if let Some(fields) = frame.as_object_mut() {
+        plain.chain(lengths.clone()).for_each(|(name, value)| {
+            fields.entry(name).or_insert(value);
+        });
+    }
+    frame
 }

@@ -2,10 +2,9 @@
 
 use glam::Vec3;
 use meniscus::{
-    Camera, Particles, Settings,
+    Camera, Particles,
     host::{HostError, Session},
     shader::{SIDE_BACK, SIDE_FRONT},
-    targets::Id,
 };
 
 /// Says why no pixel of the last frame shows liquid, if none does and there are particles.
@@ -13,15 +12,15 @@ pub fn explain(
     session: &mut Session,
     particles: &Particles,
     camera: &Camera,
-    settings: &Settings,
     size: [u32; 2],
 ) -> Result<Option<String>, HostError> {
     if particles.ellipsoids.is_empty() {
         return Ok(None);
     }
-    let body = session.renderer.needs(settings, false).body_depth();
-    for (id, side) in [body, Id::SplashDepth].into_iter().flat_map(|id| [(id, SIDE_FRONT), (id, SIDE_BACK)]) {
-        let depths = session.words(id, side)?.unwrap_or_default();
+    let surfaces = session.renderer.surfaces();
+    let depths = [surfaces.body_depth, surfaces.splash_depth].into_iter().flatten();
+    for (name, side) in depths.flat_map(|name| [(name, SIDE_FRONT), (name, SIDE_BACK)]) {
+        let depths = session.words(name, side)?.unwrap_or_default();
         if depths.iter().any(|w| f32::from_bits(*w) > 0.0) {
             return Ok(None);
         }

@@ -4,16 +4,19 @@
 
 mod bench;
 mod camera;
+mod choices;
 mod codes;
 mod dump;
 mod empty;
 mod info;
 mod options;
 mod outputs;
+mod picture;
 mod prepared;
 mod render;
 mod report;
 mod scene;
+mod scene_file;
 mod stats;
 mod temporary;
 mod terminal;
@@ -103,4 +106,16 @@ fn help(mut said: clap::Error) -> Result<ExitCode, Box<dyn Error>> {
         }
     }
     Ok(ExitCode::from(if wrong { 2 } else { 0 }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Cli;
+    use clap::CommandFactory;
+
+    /// Flags that follow from the library's parameters have names of their own.
+    #[test]
+    fn no_two_options_have_one_name() {
+        Cli::command().debug_assert();
+    }
 }

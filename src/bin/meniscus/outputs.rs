@@ -159,7 +159,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
 }
 
 /// Files of a dump, but for the maps.
-const DUMPED: [&str; 9] = [
+const DUMPED: [&str; 10] = [
+    "thickness.npy",
     "pattern.npy",
     "outcome.npy",
     "hits.npy",

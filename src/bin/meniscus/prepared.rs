@@ -7,7 +7,6 @@ use meniscus::{
     prepare::{Report, ellipsoids::eigen_symmetric},
     shader as s,
     space::Space,
-    targets::Id,
 };
 
 /// What the last frame made of the positions.
@@ -26,10 +25,11 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
         let triple = |w: &[u32]| Vec3::from_slice(&[w[0], w[1], w[2]].map(f32::from_bits));
         Ok::<_, HostError>(words(session, id)?.chunks_exact(3).map(triple).collect::<Vec<_>>())
     };
-    let (centers, diagonals, mixed) = (array(Id::Centers)?, array(Id::Diagonals)?, array(Id::Mixed)?);
+    let (centers, diagonals, mixed) =
+        (array("particle centres")?, array("particle shapes (diagonal)")?, array("particle shapes (mixed)")?);
     let order = order(session, centers.len())?;
     let sphere = Mat3::from_diagonal(Vec3::splat(radius));
-    let space = words(session, Id::Extent)?;
+    let space = words(session, "extent")?;
     let space = if space.is_empty() { Space::new(radius, Vec3::ZERO) } else { Space::prepared(radius, &space) };
     let (mut splash, mut body) = (Vec::new(), Vec::new());
     for (((center, d), m), index) in centers.into_iter().zip(diagonals).zip(mixed).zip(order) {
@@ -48,23 +48,23 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     }
     let splash_count = splash.len();
     let (ellipsoids, index) = splash.into_iter().chain(body).unzip();
-    let counters = session.words(Id::Counters, 0)?.unwrap_or_else(|| vec![0; s::COUNTERS as usize]);
-    let count = |slot: u32| counters[slot as usize] as usize;
+    let counters = session.counters()?;
+    let count = |name| counters.iter().find(|(n, _)| *n == name).map_or(0, |(_, count)| *count as usize);
     let report = Report {
-        splash: count(s::COUNT_SPLASH),
-        body: count(s::COUNT_BODY),
-        few_neighbours: count(s::COUNT_FEW_NEIGHBOURS),
-        degenerate: count(s::COUNT_DEGENERATE),
-        clamped_long: count(s::COUNT_CLAMPED_LONG),
-        clamped_ratio: count(s::COUNT_CLAMPED_RATIO),
+        splash: count("splash"),
+        body: count("body"),
+        few_neighbours: count("ellipsoid_few_neighbours"),
+        degenerate: count("ellipsoid_degenerate"),
+        clamped_long: count("ellipsoid_clamped_long"),
+        clamped_ratio: count("ellipsoid_clamped_ratio"),
     };
     Ok(Prepared { particles: Particles { radius, ellipsoids, splash_count }, report, index })
 }
 
 /// Which position each of so many particles of the device's arrays was.
 fn order(session: &mut Session, particles: usize) -> Result<Vec<u32>, HostError> {
-    let all = session.words(Id::Order, 0)?.unwrap_or_default();
-    let passes = session.words(Id::Extent, 0)?.map_or(0, |e| e[s::EXTENT_PASSES as usize] as usize);
+    let all = session.words("sort order", 0)?.unwrap_or_default();
+    let passes = session.words("extent", 0)?.map_or(0, |e| e[s::EXTENT_PASSES as usize] as usize);
     let sorted = all.len() == 2 * particles && passes > 0;
     // The relation table leaves particles in the order of the input.
     Ok(if sorted { all[(passes & 1) * particles..][..particles].to_vec() } else { (0..particles as u32).collect() })
@@ -72,7 +72,7 @@ fn order(session: &mut Session, particles: usize) -> Result<Vec<u32>, HostError>
 
 /// What the device lists of so many particles' neighbours, and how many words of it are each one's.
 fn shares(session: &mut Session, particles: usize) -> Result<(Vec<u32>, usize), HostError> {
-    let words = session.words(Id::Neighbours, 0)?.unwrap_or_default();
+    let words = session.words("neighbours (debug)", 0)?.unwrap_or_default();
     let share = words.len() / particles.max(1);
     Ok((words, share.max(1)))
 }

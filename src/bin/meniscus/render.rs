@@ -2,16 +2,18 @@
 
 use crate::{
     dump, empty, on,
-    options::Options,
+    options::{Options, or},
     outputs,
+    picture::{Picture, SUPERSAMPLE},
     prepared::{self, Prepared},
     scene::{Prepare, Scene, spinner},
-    stats, terminal,
+    scene_file, stats, terminal,
 };
 use glam::Vec3;
 use meniscus::{
     Camera, FrameInput, Particles, Settings,
     host::{Gpu, Instance, Session},
+    inspect::Inspection,
     io::images,
     prepare::Report,
 };
@@ -26,9 +28,12 @@ pub struct Args {
     pub output: PathBuf,
     #[command(flatten)]
     pub options: Options,
-    /// Render at a multiple of the size and average
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3))]
-    pub supersample: u32,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(SUPERSAMPLE),
+        help = or("Render at a multiple of the size and average", Picture::default().supersample))]
+    pub supersample: Option<u32>,
+    /// Write all that decides the picture as a scene file (TOML): `render --scene FILE` makes it again
+    #[arg(long, value_name = "FILE")]
+    pub save_scene: Option<PathBuf>,
     /// Write timings, memory, counts and parameters as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
@@ -44,20 +49,27 @@ pub struct Args {
 }
 
 impl Args {
-    pub fn prepare(&self) -> Prepare {
-        self.options.prepare.unwrap_or(Prepare::Cpu)
+    /// The picture that is asked for: by default, by the scene file, by these arguments.
+    fn picture(&self) -> Result<Picture, Box<dyn std::error::Error>> {
+        let mut picture = self.options.over(self.options.base()?, None)?;
+        picture.particles = self.file.clone().or(picture.particles);
+        picture.supersample = self.supersample.unwrap_or(picture.supersample);
+        picture.prepare.get_or_insert(Prepare::Cpu);
+        Ok(picture)
     }
 
     /// Refuses what cannot be written, before anything is rendered.
-    fn check(&self) -> Result<(), Box<dyn std::error::Error>> {
+    fn check(&self, picture: &Picture) -> Result<(), Box<dyn std::error::Error>> {
         images::check_extension(&self.output)?;
         let mut outputs = vec![("the picture (--output)", self.output.as_path())];
         outputs.extend(self.stats.as_deref().map(|p| ("the statistics (--stats)", p)));
+        outputs.extend(self.save_scene.as_deref().map(|p| ("the scene file (--save-scene)", p)));
         let mut inputs = Vec::new();
-        inputs.extend(self.file.as_deref().map(|p| ("the particle file", p)));
-        inputs.extend(self.options.env.as_deref().map(|p| ("the environment map (--env)", p)));
+        inputs.extend(self.options.scene.as_deref().map(|p| ("the scene file (--scene)", p)));
+        inputs.extend(picture.particles.as_deref().map(|p| ("the particle file", p)));
+        inputs.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
         outputs::check(&outputs, self.dump.as_deref(), &inputs)?;
-        if self.dump_neighbours && !self.prepare().on_device() {
+        if self.dump_neighbours && !picture.place().on_device() {
             return Err("--dump-neighbours lists what the device finds: add --prepare gpu".into());
         }
         Ok(())
@@ -67,6 +79,8 @@ impl Args {
 /// Everything that decides the picture, after defaults.
 pub struct Job<'a> {
     pub args: &'a Args,
+    /// With nothing left open.
+    pub picture: Picture,
     pub scene: &'a Scene,
     /// What the device prepared, once it is read back.
     pub prepared: Option<Prepared>,
@@ -90,13 +104,14 @@ impl Job<'_> {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
-    args.check()?;
-    let environment = args.options.environment(args.supersample)?;
+    let picture = args.picture()?;
+    args.check(&picture)?;
+    let environment = picture.environment()?;
     let instance = Instance::new(args.validate)?;
     let device = instance.pick(args.options.device.as_deref())?;
-    let scene = args.options.load(args.file.as_deref(), args.prepare())?;
+    let scene = picture.load(picture.particles.as_deref(), picture.place())?;
     announce(&scene, &device.name, &device.driver);
-    let mut job = plan(args, &scene)?;
+    let mut job = plan(args, picture, &scene)?;
     let on_device = on(&device);
     let drawn = (|| {
         let gpu = Gpu::new(&instance, device)?;
@@ -134,52 +149,67 @@ fn announce(scene: &Scene, device: &str, driver: &str) {
     terminal::progress(format!("particles: {what}"));
 }
 
-fn plan<'a>(args: &'a Args, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::error::Error>> {
-    let options = &args.options;
-    let (camera, eye) = options.camera(scene)?;
-    let settings = options.settings(&scene.particles, args.supersample)?;
+fn plan<'a>(args: &'a Args, picture: Picture, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::error::Error>> {
+    let (camera, eye, view) = picture.camera(scene)?;
+    let settings = picture.frame_settings(&scene.particles)?;
     let times = |edge: u32| {
-        edge.checked_mul(args.supersample).ok_or("--size times --supersample is too large: use a smaller one of them")
+        let wide = edge.checked_mul(picture.supersample);
+        wide.ok_or("--size times --supersample is too large: use a smaller one of them")
     };
-    let size = [times(options.size[0])?, times(options.size[1])?];
-    Ok(Job { args, scene, prepared: None, camera, eye, settings, size, eye_inside: scene.inside(eye) })
+    let size = [times(picture.size[0])?, times(picture.size[1])?];
+    let picture = Picture {
+        radius: Some(shortest(scene.particles.radius)),
+        camera: view,
+        settings: picture.settings(&scene.particles),
+        absorption_given: true,
+        ..picture
+    };
+    Ok(Job { args, picture, scene, prepared: None, camera, eye, settings, size, eye_inside: scene.inside(eye) })
+}
+
+/// A number as few digits say it, which is the same in single precision.
+fn shortest(value: f32) -> f64 {
+    let short = value.to_string().parse().ok().filter(|short| *short as f32 == value);
+    short.unwrap_or(value.into())
 }
 
 /// Renders and writes everything; says so if the picture shows none of the liquid.
 fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dyn std::error::Error>> {
-    let upload = job.scene.give(job.args.prepare(), session)?;
+    let upload = job.scene.give(job.picture.place(), session)?;
     let (camera, settings) = (job.camera, job.settings);
-    let mut input = FrameInput {
-        eye_inside: job.eye_inside,
-        positions: upload.as_ref().map(|u| job.scene.on_device(u)),
-        // The session has a canvas of its own.
-        ..FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null())
-    };
+    // The session has a canvas of its own.
+    let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
+    input.eye_inside = job.eye_inside;
+    input.positions = upload.as_ref().map(|u| job.scene.on_device(u));
     let mut times = session.frame(&input)?;
     if job.args.stats.is_some() {
         // The first frame compiles shaders; the second is timed.
         times = session.frame(&input)?;
     }
-    let picture = average(&session.picture()?, job.size, job.args.supersample);
+    let picture = average(&session.picture()?, job.size, job.picture.supersample);
     let output = &job.args.output;
-    outputs::write(output, &images::encode_picture(output, job.args.options.size, &picture)?)?;
-    let no_liquid = empty::explain(session, &job.scene.particles, &camera, &settings, job.size)?;
+    outputs::write(output, &images::encode_picture(output, job.picture.size, &picture)?)?;
+    if let Some(path) = &job.args.save_scene {
+        outputs::write(path, scene_file::text(&job.picture, path)?.as_bytes())?;
+    }
+    let no_liquid = empty::explain(session, &job.scene.particles, &camera, job.size)?;
     if job.args.dump.is_none() && job.args.stats.is_none() {
         return Ok(no_liquid);
     }
     let memory = session.renderer.memory();
-    input.debug = true;
-    input.neighbours = if job.args.dump_neighbours { 256 } else { 0 };
+    let mut inspection = Inspection { walks: true, neighbours: if job.args.dump_neighbours { 256 } else { 0 } };
+    session.renderer.inspect(inspection);
     session.frame(&input)?;
     if job.args.dump_neighbours {
         // Counts are right whatever there is room for.
         let most = prepared::most_neighbours(session, job.scene.positions.len())?;
-        if most > input.neighbours {
-            input.neighbours = most;
+        if most > inspection.neighbours {
+            inspection.neighbours = most;
+            session.renderer.inspect(inspection);
             session.frame(&input)?;
         }
     }
-    if job.args.prepare().on_device() {
+    if job.picture.place().on_device() {
         job.prepared = Some(prepared::read(session, job.scene.particles.radius)?);
     }
     if let Some(folder) = &job.args.dump {

@@ -2,10 +2,11 @@
 
 use crate::{
     bench::{Args, Run, SEED},
-    options, outputs,
+    choices, options, outputs,
+    picture::Picture,
     terminal::NotWritten,
 };
-use meniscus::{Settings, host::DeviceInfo};
+use meniscus::host::DeviceInfo;
 use serde_json::{Map, Value, json};
 use std::{error::Error, path::Path};
 
@@ -40,23 +41,24 @@ fn median(times: &[f64]) -> f64 {
 /// Everything timed of a run: name and its milliseconds, frame by frame.
 fn rows(run: &Run) -> Vec<(String, Vec<f64>)> {
     let mut rows = run.passes.clone();
-    if run.preparation().iter().any(|t| *t > 0.0) {
-        rows.push(("= preparation".into(), run.preparation()));
+    if run.preparation.iter().any(|t| *t > 0.0) {
+        rows.push(("= preparation".into(), run.preparation.clone()));
     }
     rows.push(("= sum of passes".into(), run.sum.clone()));
     rows.push(("= frame, first to last timestamp".into(), run.span.clone()));
     rows
 }
 
-pub fn print(run: &Run, args: &Args) -> Result<(), NotWritten> {
-    let on_device = args.prepare().on_device();
+pub fn print(run: &Run, args: &Args, picture: &Picture) -> Result<(), NotWritten> {
+    let on_device = picture.place().on_device();
     args.show("")?;
     args.show(&format!(
-        "{}: {} particles, {:.1} bytes of device memory each, {:.1} MB in all",
+        "{}, {}: {} particles, {:.1} bytes of device memory each, {:.1} MB in all",
         run.scene,
+        run.method,
         run.particles,
         run.bytes_per_particle(on_device),
-        run.memory.iter().map(|e| e.bytes).sum::<u64>() as f64 * 1e-6
+        run.bytes() as f64 * 1e-6
     ))?;
     args.show(&format!("{:<34} {:>10} {:>10} {:>10}  ms", "pass", "median", "p5", "p95"))?;
     for (name, times) in rows(run) {
@@ -69,12 +71,41 @@ pub fn print(run: &Run, args: &Args) -> Result<(), NotWritten> {
     Ok(())
 }
 
+/// A table of methods that drew one scene: medians, and what they need.
+pub fn compare(runs: &[Run], args: &Args) -> Result<(), NotWritten> {
+    if args.methods.is_empty() || runs.is_empty() {
+        return Ok(());
+    }
+    let mut parts: Vec<&str> = Vec::new();
+    for (part, _) in runs.iter().flat_map(|r| &r.parts) {
+        if !parts.contains(&part.as_str()) {
+            parts.push(part);
+        }
+    }
+    let line = |name: &str, cells: Vec<String>| {
+        let cells: String = cells.iter().map(|c| format!(" {c:>10}")).collect();
+        args.show(&format!("{name:<20}{cells}"))
+    };
+    args.show("")?;
+    args.show(&format!("{}: methods compared, medians in ms", runs[0].scene))?;
+    let heads = ["frame"].into_iter().chain(parts.iter().copied()).chain(["MB"]);
+    line("method", heads.map(str::to_owned).collect())?;
+    for run in runs {
+        let of = |part: &str| run.parts.iter().find(|(name, _)| name == part).map(|(_, times)| median(times));
+        let ms = |time: Option<f64>| time.map_or("-".to_owned(), |ms| format!("{ms:.3}"));
+        let times = [Some(median(&run.span))].into_iter().chain(parts.iter().map(|p| of(p)));
+        line(&run.method, times.map(ms).chain([format!("{:.1}", run.bytes() as f64 * 1e-6)]).collect())?;
+    }
+    Ok(())
+}
+
 /// Exponent of the preparation's median time against the number of particles, fitted to runs of 100,000 and more, where
-/// there are two, else to all; and the least number of particles among them.
+/// there are two, else to all; and the least number of particles among them. Of the first method.
 pub fn growth(runs: &[Run]) -> Option<(f64, usize)> {
     let points = |least: usize| {
-        let fits = runs.iter().filter(|r| r.particles >= least && median(&r.preparation()) > 0.0);
-        fits.map(|r| ((r.particles as f64).ln(), median(&r.preparation()).ln())).collect::<Vec<_>>()
+        let first = runs.iter().filter(|r| r.method == runs[0].method);
+        let fits = first.filter(|r| r.particles >= least && median(&r.preparation) > 0.0);
+        fits.map(|r| ((r.particles as f64).ln(), median(&r.preparation).ln())).collect::<Vec<_>>()
     };
     let (points, from) = Some((points(100_000), 100_000)).filter(|(p, _)| p.len() >= 2).unwrap_or((points(1), 1));
     let n = points.len() as f64;
@@ -88,81 +119,108 @@ fn figures(times: &[f64]) -> Value {
     json!({"median_ms": median(times), "p5_ms": quantile(times, 0.05), "p95_ms": quantile(times, 0.95)})
 }
 
-pub fn write(path: &Path, args: &Args, device: &DeviceInfo, runs: &[Run]) -> Result<(), Box<dyn Error>> {
-    let bytes = if extension(path) == Some("csv") { table(args, device, runs)? } else { tree(args, device, runs)? };
+pub fn write(
+    path: &Path,
+    args: &Args,
+    picture: &Picture,
+    device: &DeviceInfo,
+    runs: &[Run],
+) -> Result<(), Box<dyn Error>> {
+    let csv = extension(path) == Some("csv");
+    let bytes = if csv { table(args, picture, device, runs)? } else { tree(args, picture, device, runs)? };
     Ok(outputs::write(path, &bytes)?)
 }
 
-/// What the camera and the scene were asked for, by name.
-fn asked(args: &Args) -> Vec<(&'static str, Value)> {
-    let o = &args.options;
-    vec![
-        ("eye", json!(o.eye.map(|v| v.to_array()))),
-        ("target", json!(o.target.map(|v| v.to_array()))),
-        ("up", json!(o.up.to_array())),
-        ("fov_y_degrees", json!(o.fov_y)),
-        ("environment", json!(o.env.as_ref().map(|p| p.to_string_lossy()))),
-        ("radius_given", json!(o.radius)),
-        ("splash_threshold", json!(o.splash_threshold)),
-        ("drop_invalid", json!(o.drop_invalid)),
-        ("max_memory", json!(o.max_memory.bytes())),
-    ]
+/// Fields of fields by their names with dots between them.
+fn flat(name: &str, value: Value) -> Vec<(String, Value)> {
+    match value {
+        Value::Object(fields) => fields.into_iter().flat_map(|(k, v)| flat(&format!("{name}.{k}"), v)).collect(),
+        value => vec![(name.to_owned(), value)],
+    }
 }
 
-/// CSV: a row for each pass of each run, with everything that it was measured with.
-fn table(args: &Args, device: &DeviceInfo, runs: &[Run]) -> Result<Vec<u8>, Box<dyn Error>> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    let measured = ["scene", "particles", "pass", "median_ms", "p5_ms", "p95_ms", "bytes_per_particle"];
-    let constant = ["frames", "warmup", "size", "prepare", "device", "driver", "commit", "seed"];
-    let names = asked(args).into_iter().chain(options::record(&Settings::default())).map(|(name, _)| name);
-    csv.write_record(measured.into_iter().chain(constant).chain(names))?;
-    // A cell is empty where nothing was given.
-    let cell = |value: Value| match value {
+/// What is in a cell; nothing where nothing was given.
+fn cell(value: Value) -> String {
+    match value {
         Value::Null => String::new(),
         Value::String(text) => text,
         other => other.to_string(),
+    }
+}
+
+/// Every parameter of any run, and its unit.
+fn parameters(runs: &[Run]) -> Vec<(String, String)> {
+    let mut all: Vec<(String, String)> = Vec::new();
+    for run in runs {
+        let units = choices::units(&run.settings);
+        for name in choices::record(&run.settings).into_iter().map(|(name, _)| name) {
+            if !all.iter().any(|(n, _)| *n == name) {
+                let unit = units.get(&name).and_then(Value::as_str).unwrap_or_default().to_owned();
+                all.push((name, unit));
+            }
+        }
+    }
+    all
+}
+
+/// CSV: a row for each pass of each run, with everything that it was measured with.
+fn table(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    let measured = ["scene", "method", "particles", "pass", "median_ms", "p5_ms", "p95_ms", "bytes_per_particle"];
+    let constant = ["frames", "warmup", "device", "driver", "commit", "seed"];
+    let asked: Vec<_> = picture.record_rest().into_iter().flat_map(|(name, value)| flat(&name, value)).collect();
+    let parameters = parameters(runs);
+    let units = |(name, unit): &(String, String)| match unit.as_str() {
+        "" => name.clone(),
+        unit => format!("{name} [{unit}]"),
     };
+    let heads = measured.into_iter().chain(constant).map(str::to_owned);
+    csv.write_record(heads.chain(asked.iter().map(|(name, _)| name.clone())).chain(parameters.iter().map(units)))?;
     for run in runs {
         for (name, times) in rows(run) {
             let ms = |share| format!("{:.6}", quantile(&times, share));
             let row = [
                 run.scene.clone(),
+                run.method.clone(),
                 run.particles.to_string(),
                 name.trim_start_matches("= ").to_owned(),
                 ms(0.5),
                 ms(0.05),
                 ms(0.95),
-                format!("{:.3}", run.bytes_per_particle(args.prepare().on_device())),
+                format!("{:.3}", run.bytes_per_particle(picture.place().on_device())),
                 args.frames.to_string(),
                 args.warmup.to_string(),
-                format!("{}x{}", args.options.size[0], args.options.size[1]),
-                args.prepare().name(),
                 device.name.clone(),
                 device.driver.clone(),
                 COMMIT.to_owned(),
                 SEED.to_string(),
             ];
-            let settings = asked(args).into_iter().chain(options::record(&run.settings)).map(|(_, value)| cell(value));
-            csv.write_record(row.into_iter().chain(settings))?;
+            let mut record = choices::record(&run.settings);
+            let settings = parameters.iter().map(|(name, _)| record.remove(name).map(cell).unwrap_or_default());
+            let asked = asked.iter().map(|(_, value)| cell(value.clone()));
+            csv.write_record(row.into_iter().chain(asked).chain(settings))?;
         }
     }
     Ok(csv.into_inner()?)
 }
 
 /// JSON: everything.
-fn tree(args: &Args, device: &DeviceInfo, runs: &[Run]) -> Result<Vec<u8>, Box<dyn Error>> {
-    let on_device = args.prepare().on_device();
-    let object = |fields: Vec<(&str, Value)>| fields.into_iter().map(|(k, v)| (k.to_owned(), v)).collect::<Map<_, _>>();
+fn tree(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let on_device = picture.place().on_device();
+    let medians = |of: &[(String, Vec<f64>)]| of.iter().map(|(n, t)| (n.clone(), figures(t))).collect::<Map<_, _>>();
     let each: Vec<_> = runs
         .iter()
         .map(|run| {
             json!({
                 "scene": run.scene,
+                "method": run.method,
                 "particles": run.particles,
                 "radius": run.radius,
-                "settings": object(options::record(&run.settings)),
+                "settings": choices::record(&run.settings),
+                "units": choices::units(&run.settings),
                 "passes": run.passes.iter().map(|(name, t)| json!({"pass": name, "ms": figures(t)})).collect::<Vec<_>>(),
-                "preparation": figures(&run.preparation()),
+                "parts": medians(&run.parts),
+                "preparation": figures(&run.preparation),
                 "preparation_cpu_ms": if on_device { Value::Null } else { json!(run.prepare_cpu_ms) },
                 "sum_of_passes": figures(&run.sum),
                 "frame_span": figures(&run.span),
@@ -180,10 +238,10 @@ fn tree(args: &Args, device: &DeviceInfo, runs: &[Run]) -> Result<Vec<u8>, Box<d
             "times": "GPU timestamps around each pass; passes of one name summed; every frame waited for",
             "frames": args.frames,
             "warmup": args.warmup,
-            "size": args.options.size,
+            "size": picture.size,
             "seed": SEED,
-            "prepare": args.prepare().name(),
-            "asked": object(asked(args)),
+            "prepare": picture.place().name(),
+            "asked": picture.record_rest(),
             "not_asked": "eye and target that are null frame the liquid; radius that is null is the file's or estimated",
             "validation": false,
         },

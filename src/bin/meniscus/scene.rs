@@ -1,17 +1,16 @@
 //! From a particle file to particles as drawn.
 
+use crate::picture::Picture;
 use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
     Class, Ellipsoid, Particles,
     host::{Session, Upload},
-    io::{
-        Budget,
-        particles::{Invalid, check_finite, read_bytes, read_within},
-    },
+    io::particles::{Invalid, check_finite, read_bytes, read_within},
     prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
 };
+use serde::{Deserialize, Serialize};
 use std::{error::Error, path::Path, time::Duration};
 
 /// The dam break that is rendered when no file is named; see assets/README.md.
@@ -33,18 +32,9 @@ pub struct Scene {
     density: Option<DensityField>,
 }
 
-/// Which file, and how to read it.
-pub struct Source<'a> {
-    pub file: Option<&'a Path>,
-    pub radius: Option<f64>,
-    pub splash_threshold: f32,
-    pub drop_invalid: bool,
-    pub budget: Budget,
-    pub prepare: Prepare,
-}
-
 /// Where classes and ellipsoids are made.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Prepare {
     /// On the CPU, before the frame.
     Cpu,
@@ -64,27 +54,28 @@ impl Prepare {
         self.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned())
     }
 
-    fn search(self) -> Search {
-        if self == Prepare::GpuRelation { Search::Relation } else { Search::Runs }
+    fn search(self, otherwise: Search) -> Search {
+        if self == Prepare::GpuRelation { Search::Relation } else { otherwise }
     }
 }
 
 impl Scene {
-    pub fn load(source: &Source) -> Result<Scene, Box<dyn Error>> {
+    /// Reads a particle file, or what is embedded, and prepares it as the picture wants it.
+    pub fn load(picture: &Picture, source: Option<&Path>, prepare: Prepare) -> Result<Scene, Box<dyn Error>> {
         let bar = spinner("reading particles");
-        let path = source.file.unwrap_or(Path::new("embedded dam_break.bgeo"));
-        let mut file = match source.file {
-            Some(path) => read_within(path, &source.budget)?,
-            None => read_bytes(path, EMBEDDED, &source.budget)?,
+        let path = source.unwrap_or(Path::new("embedded dam_break.bgeo"));
+        let mut file = match source {
+            Some(path) => read_within(path, &picture.max_memory)?,
+            None => read_bytes(path, EMBEDDED, &picture.max_memory)?,
         };
-        let policy = if source.drop_invalid { Invalid::Drop } else { Invalid::Reject };
+        let policy = if picture.drop_invalid { Invalid::Drop } else { Invalid::Reject };
         let dropped = check_finite(&mut file, policy, path)?;
         bar.finish_and_clear();
 
         let origin = origin(&file.positions);
         let positions: Vec<Vec3> = file.positions.iter().map(|p| (*p - origin).as_vec3()).collect();
-        let (radius, radius_source) = match (source.radius, file.radius, source.file) {
-            (Some(r), _, _) => (r, "--radius"),
+        let (radius, radius_source) = match (picture.radius, file.radius, source) {
+            (Some(r), _, _) => (r, "given"),
             (None, _, None) => (EMBEDDED_RADIUS, "embedded scene"),
             (None, Some(r), _) => (r, "file"),
             (None, None, _) if positions.is_empty() => (1.0, "no particles"),
@@ -107,12 +98,11 @@ impl Scene {
             .map(|c| c.iter().map(|c| if *c == 0 { Class::Splash } else { Class::Body }).collect());
         let axes: Option<Vec<Mat3>> = file.axes.as_ref().map(|a| a.iter().map(|m| m.as_mat3()).collect());
         let options = Options {
-            support: file.support.map(|s| s as f32),
-            splash_threshold: source.splash_threshold,
-            search: source.prepare.search(),
-            ..Options::default()
+            support: picture.preparation.support.or(file.support.map(|s| s as f32)),
+            search: prepare.search(picture.preparation.search),
+            ..picture.preparation
         };
-        if source.prepare.on_device() && (classes.is_some() || axes.is_some()) {
+        if prepare.on_device() && (classes.is_some() || axes.is_some()) {
             return Err(
                 "it brings classes or ellipsoids of its own, and --prepare gpu makes them anew: use --prepare cpu"
                     .into(),
@@ -124,8 +114,8 @@ impl Scene {
             classes: classes.as_deref(),
             ellipsoids: axes.as_deref(),
         };
-        let (particles, report, prepare_ms) = make(&input, &options, source.prepare)?;
-        let density = if report.body > 0 || source.prepare.on_device() {
+        let (particles, report, prepare_ms) = make(&input, &options, prepare)?;
+        let density = if report.body > 0 || prepare.on_device() {
             Some(DensityField::new(&positions, radius as f32, &options)?)
         } else {
             None
@@ -134,8 +124,9 @@ impl Scene {
     }
 
     /// Positions that were made, not read.
-    pub fn synthetic(positions: Vec<Vec3>, radius: f32, place: Prepare) -> Result<Scene, Box<dyn Error>> {
-        let options = Options { search: place.search(), ..Options::default() };
+    pub fn synthetic(positions: Vec<Vec3>, radius: f32, picture: &Picture) -> Result<Scene, Box<dyn Error>> {
+        let place = picture.place();
+        let options = Options { search: place.search(picture.preparation.search), ..picture.preparation };
         let input = Input { positions: &positions, radius, classes: None, ellipsoids: None };
         let (particles, report, prepare_ms) = make(&input, &options, place)?;
         Ok(Scene {
@@ -162,8 +153,9 @@ impl Scene {
 
     /// What [`Scene::give`] uploaded.
     pub fn on_device(&self, upload: &Upload) -> DevicePositions {
-        let packed = DevicePositions::packed(upload.buffer, self.positions.len() as u32, self.particles.radius);
-        DevicePositions { options: self.options, ..packed }
+        let mut all = DevicePositions::packed(upload.buffer, self.positions.len() as u32, self.particles.radius);
+        all.options = self.options;
+        all
     }
 
     /// Whether a point (relative to the origin) is inside the body: half as dense as a filled body.
@@ -177,7 +169,7 @@ fn make(input: &Input, options: &Options, place: Prepare) -> Result<(Particles, 
     let bar = progress(input.positions.len() as u64, "classes and ellipsoids");
     let start = std::time::Instant::now();
     let (particles, report) = if place.on_device() {
-        (uniform(input.positions, input.radius), Report::default())
+        (uniform(input, options), Report::default())
     } else {
         prepare::prepare_with_progress(input, options, &|done| bar.set_position(done as u64))?
     };
@@ -187,9 +179,10 @@ fn make(input: &Input, options: &Options, place: Prepare) -> Result<(Particles, 
 }
 
 /// Spheres as large as any ellipsoid that the device may make: for the camera, and for the box around the liquid.
-fn uniform(positions: &[Vec3], radius: f32) -> Particles {
-    let axes = Mat3::from_diagonal(Vec3::splat(radius * Options::default().max_semi_axis));
-    let ellipsoids = positions.iter().map(|p| Ellipsoid { center: *p, axes }).collect();
+fn uniform(input: &Input, options: &Options) -> Particles {
+    let radius = input.radius;
+    let axes = Mat3::from_diagonal(Vec3::splat(radius * options.max_semi_axis));
+    let ellipsoids = input.positions.iter().map(|p| Ellipsoid { center: *p, axes }).collect();
     Particles { radius, ellipsoids, splash_count: 0 }
 }
 

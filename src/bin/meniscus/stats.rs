@@ -1,11 +1,7 @@
 //! `--stats`: timings, memory, counts, and everything needed to repeat the run.
 
 use crate::{codes, dump, outputs, render::Job};
-use meniscus::{
-    host::Session,
-    profile::FrameTimes,
-    targets::{Id, LedgerEntry},
-};
+use meniscus::{LedgerEntry, host::Session, profile::FrameTimes};
 use serde_json::{Map, Value, json};
 use std::{error::Error, path::Path};
 
@@ -16,7 +12,7 @@ pub fn write(
     times: Option<&FrameTimes>,
     memory: &[LedgerEntry],
 ) -> Result<(), Box<dyn Error>> {
-    let walk = session.words(Id::Walk, 0)?.unwrap_or_default();
+    let walk = session.words("walk (debug)", 0)?.unwrap_or_default();
     let share = |table: &[(u32, &str)], channel: usize| {
         let mut counts = vec![0u64; table.len()];
         for w in walk.chunks_exact(4) {
@@ -25,10 +21,8 @@ pub fn write(
         table.iter().map(|(code, name)| ((*name).to_owned(), json!(counts[*code as usize]))).collect::<Map<_, _>>()
     };
     let mut guards = Map::new();
-    if let Some(counters) = session.words(Id::Counters, 0)? {
-        guards.extend(codes::COUNTERS.iter().map(|(slot, name)| ((*name).to_owned(), json!(counters[*slot as usize]))));
-    }
-    let direction = session.words(Id::Direction, 0)?.unwrap_or_default();
+    guards.extend(session.counters()?.into_iter().map(|(name, count)| (name.to_owned(), json!(count))));
+    let direction = session.words("final direction (debug)", 0)?.unwrap_or_default();
     let flipped: f64 = direction.chunks_exact(4).map(|d| f64::from(f32::from_bits(d[3]))).sum();
     guards.insert("walk_normal_faced_the_wrong_way".into(), json!(flipped));
     let r = job.report();
@@ -38,7 +32,7 @@ pub fn write(
     guards.insert("ellipsoid_clamped_ratio".into(), json!(r.clamped_ratio));
 
     let gpu = times.map_or(Value::Null, |t| {
-        let passes: Vec<_> = t.passes.iter().map(|p| json!({"pass": p.name, "ms": p.ms})).collect();
+        let passes: Vec<_> = t.passes.iter().map(|p| json!({"pass": p.name, "part": p.part, "ms": p.ms})).collect();
         json!({"passes": passes, "sum_ms": t.passes.iter().map(|p| p.ms).sum::<f64>(), "span_ms": t.span_ms})
     });
     let info = &session.gpu.info;
@@ -46,7 +40,7 @@ pub fn write(
         "meniscus": env!("CARGO_PKG_VERSION"),
         "device": {"name": info.name, "driver": info.driver, "kind": info.kind, "vulkan": info.api},
         "particles": {"splash": r.splash, "body": r.body, "dropped": job.scene.dropped, "radius_source": job.scene.radius_source},
-        "prepare": job.args.prepare().name(),
+        "prepare": job.picture.place().name(),
         "prepare_cpu_ms": job.scene.prepare_ms,
         "gpu": gpu,
         "gpu_protocol": "second frame after start, by timestamps; validation makes times meaningless",

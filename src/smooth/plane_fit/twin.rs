@@ -120,10 +120,7 @@ fn judge(frame: &Frame, p: &PlaneFit, own: f32, plane: &Plane) -> Outcome {
         Outcome::ZeroNormal
     } else if plane.facing < f64::from(FIT_GRAZING_LIMIT) {
         Outcome::Grazing
-    } else if update.is_nan()
-        || update > f64::from(FIT_UPDATE_LIMIT * p.sigma)
-        || plane.depth < f64::from(frame.near)
-    {
+    } else if update.is_nan() || update > f64::from(FIT_UPDATE_LIMIT * p.sigma) || plane.depth < f64::from(frame.near) {
         Outcome::Unbounded
     } else {
         Outcome::Fitted

@@ -1,0 +1,197 @@
+//! Everything that decides a picture: what a scene file holds, and the command line changes.
+
+use crate::{
+    camera::{self, View},
+    choices,
+    scene::{Prepare, Scene},
+};
+use glam::Vec3;
+use meniscus::{
+    Camera, Equirect, Error, Parameters, Particles, Settings,
+    io::{
+        Budget,
+        images::{self, ImageError},
+        particles::ReadError,
+    },
+    prepare,
+};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::{
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
+
+/// What is drawn, from where, how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Picture {
+    /// Particle file; the embedded dam break if there is none.
+    pub particles: Option<PathBuf>,
+    /// In world units; the file's, or estimated, if there is none.
+    pub radius: Option<f64>,
+    pub drop_invalid: bool,
+    /// Each command has a default of its own.
+    pub prepare: Option<Prepare>,
+    /// The multiple of the size that is rendered at.
+    pub supersample: u32,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Decides how far an environment map is averaged down.
+    #[serde(with = "amount")]
+    pub max_memory: Budget,
+    pub camera: View,
+    pub environment: Environment,
+    /// How classes and ellipsoids are made; a support that is not given is the file's.
+    pub preparation: prepare::Options,
+    pub settings: Settings,
+    /// Whether the absorption of the settings is meant, or is to suit the liquid's size.
+    #[serde(skip)]
+    pub absorption_given: bool,
+}
+
+/// What is infinitely far away.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Environment {
+    /// Equirectangular map; a procedural sky if there is none.
+    pub file: Option<PathBuf>,
+    /// Degrees around up, counter-clockwise as seen from above.
+    pub rotation: f32,
+}
+
+/// Multiples of the size that can be rendered at.
+pub const SUPERSAMPLE: RangeInclusive<i64> = 1..=3;
+
+impl Default for Picture {
+    fn default() -> Picture {
+        Picture {
+            particles: None,
+            radius: None,
+            drop_invalid: false,
+            prepare: None,
+            supersample: 1,
+            size: [1024, 768],
+            max_memory: Budget::default(),
+            camera: View::default(),
+            environment: Environment::default(),
+            preparation: prepare::Options::default(),
+            settings: Settings::default(),
+            absorption_given: false,
+        }
+    }
+}
+
+/// An amount of memory, as the command line has it.
+mod amount {
+    use meniscus::io::Budget;
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub fn serialize<S: Serializer>(budget: &Budget, to: S) -> Result<S::Ok, S::Error> {
+        let short = budget.to_string();
+        let exact = short.parse() == Ok(*budget);
+        to.serialize_str(&if exact { short } else { budget.bytes().to_string() })
+    }
+
+    pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Budget, D::Error> {
+        String::deserialize(from)?.parse().map_err(D::Error::custom)
+    }
+}
+
+fn wrong(parameter: &'static str, value: impl ToString, remedy: impl Into<String>) -> Error {
+    Error::Parameter { parameter, value: value.to_string(), remedy: remedy.into() }
+}
+
+impl Picture {
+    /// Checks what can be checked without the particles.
+    pub fn validate(&self) -> Result<(), Error> {
+        if let Some(radius) = self.radius.filter(|r| !meniscus::space::RADII.contains(&(*r as f32))) {
+            let (least, most) = (meniscus::space::RADII.start(), meniscus::space::RADII.end());
+            return Err(wrong(
+                "radius",
+                format!("{radius:e}"),
+                format!("use {least:e} to {most:e}; scale the scene if need be"),
+            ));
+        }
+        if !SUPERSAMPLE.contains(&i64::from(self.supersample)) {
+            let (least, most) = (SUPERSAMPLE.start(), SUPERSAMPLE.end());
+            return Err(wrong("supersample", self.supersample, format!("use {least} to {most}")));
+        }
+        if self.size.contains(&0) {
+            return Err(wrong("size", format!("{}x{}", self.size[0], self.size[1]), "use 1 or more pixels each way"));
+        }
+        if !self.environment.rotation.is_finite() {
+            return Err(wrong("environment.rotation", self.environment.rotation, "use a finite number of degrees"));
+        }
+        self.camera.validate()?;
+        self.preparation.validate()?;
+        self.settings.validate()
+    }
+
+    /// Where particles are prepared.
+    pub fn place(&self) -> Prepare {
+        self.prepare.unwrap_or(Prepare::Cpu)
+    }
+
+    /// The environment, as fine as the pixels in the middle of the picture.
+    pub fn environment(&self) -> Result<Equirect, ImageError> {
+        let Some(path) = &self.environment.file else { return Ok(Equirect::procedural_sky()) };
+        let focal_length = 0.5 * f64::from(self.size[1]) * f64::from(self.supersample)
+            / (0.5 * f64::from(self.camera.fov_y)).to_radians().tan();
+        let texels_around = (std::f64::consts::TAU * focal_length).ceil().max(1.0) as u32;
+        images::read_environment_within(path, Some(texels_around), &self.max_memory)
+    }
+
+    /// Reads a particle file, or what is embedded, and prepares it.
+    pub fn load(&self, file: Option<&Path>, prepare: Prepare) -> Result<Scene, Box<dyn std::error::Error>> {
+        Scene::load(self, file, prepare).map_err(|e| match file {
+            // Readers name their file; what comes after them does not know it.
+            Some(file) if !e.is::<ReadError>() => format!("{}: {e}", file.display()).into(),
+            _ => e,
+        })
+    }
+
+    /// The camera, its eye relative to the scene's origin, and the view that it is.
+    pub fn camera(&self, scene: &Scene) -> Result<(Camera, Vec3, View), Error> {
+        let aspect = self.size[0].max(1) as f32 / self.size[1].max(1) as f32;
+        let near = 0.1 * scene.particles.radius;
+        let (mut camera, eye, view) = camera::frame(&self.camera, scene.origin, &scene.particles, aspect, near)?;
+        camera.environment_rotation = self.environment.rotation.to_radians();
+        Ok((camera, eye, view))
+    }
+
+    /// Settings for these particles, as they are said: not widened for a multiple of the size.
+    pub fn settings(&self, particles: &Particles) -> Settings {
+        let mut settings = self.settings;
+        if !self.absorption_given {
+            let (low, high) = particles.bounds().unwrap_or((Vec3::splat(-1.0), Vec3::splat(1.0)));
+            // In double precision, which the square of no length overflows.
+            let share = (1.2 / (high - low).as_dvec3().length()) as f32;
+            settings.liquid.absorption = Vec3::new(1.0, 0.35, 0.2) * share;
+        }
+        settings
+    }
+
+    /// Settings of the frame that is rendered.
+    pub fn frame_settings(&self, particles: &Particles) -> Result<Settings, Error> {
+        let mut settings = self.settings(particles);
+        choices::widen(&mut settings, self.supersample)?;
+        Ok(settings)
+    }
+
+    /// By name, for whoever wants to repeat it.
+    pub fn record(&self) -> Value {
+        let mut shown = self.clone();
+        for path in [&mut shown.particles, &mut shown.environment.file].into_iter().flatten() {
+            *path = path.to_string_lossy().into_owned().into();
+        }
+        serde_json::to_value(&shown).unwrap_or(Value::Null)
+    }
+
+    /// Beside particles and settings: what was asked of radius, camera, environment and the like.
+    pub fn record_rest(&self) -> Map<String, Value> {
+        let Value::Object(mut all) = self.record() else { return Map::new() };
+        all.retain(|key, _| !["particles", "settings"].contains(&key.as_str()));
+        all
+    }
+}
