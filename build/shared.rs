@@ -84,7 +84,7 @@ pub fn to_rust(glsl: &str) -> Result<String, String> {
                 rust += &layout.close();
                 open = None;
             }
-            ([kind, name], Some(layout)) => {
+            ([kind, name], Some(layout)) if name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') => {
                 rust += &layout.member(kind, name, comment.trim()).map_err(|e| format!("{number}: error: {e}"))?;
             }
             _ => return Err(format!("{number}: error: build.rs does not understand this line")),

@@ -13,7 +13,9 @@ layout(set = 0, binding = 1, std430) readonly buffer VisibleBlock { uint at[]; }
 layout(set = 0, binding = 2, std430) buffer SumBlock { uint at[]; } sums;
 layout(set = 0, binding = 3, std430) buffer DrawnBlock { uint at[]; } drawn;
 layout(set = 0, binding = 4, std430) buffer DrawBlock { Draws at[]; } draws;
-layout(set = 0, binding = 5, std430) buffer CounterBlock { uint at[]; } counters;
+layout(set = 0, binding = 5, std430) buffer CounterBlock { uint at[]; } counters; // particles of each list
+layout(set = 0, binding = 6, std430) readonly buffer LargeBlock { uint at[]; } large;
+layout(constant_id = 0) const uint COUNTERS = 0; // slot of its first counter
 #include "prefix.glsl"
 
 const uint LISTS = 4u; // class * 2 + side
@@ -61,9 +63,9 @@ void main() {
     // the image, is the same either way.
     if (block == 0u && gl_LocalInvocationIndex < LISTS) {
         uint l = gl_LocalInvocationIndex, n = sums.at[LISTS * blocks() + l];
-        bool quads = (frame.quads_only | counters.at[COUNT_LARGE_SPLASH + l / 2u]) != 0u;
+        bool quads = (frame.quads_only | large.at[l / 2u]) != 0u;
         draws.at[l] = Draws(quads ? 0u : n, 1u, 0u, 0u, 4u, quads ? n : 0u, 0u, 0u);
-        counters.at[COUNT_SPLASH_FRONT + l] = n;
+        counters.at[COUNTERS + l] = n;
     }
 #endif
 #endif

@@ -10,7 +10,7 @@
 layout(local_size_x = PARTICLE_GROUP) in;
 layout(set = 0, binding = 4, std430) readonly buffer BoundBlock { uint at[]; } bounds;
 layout(set = 0, binding = 5, std430) buffer VisibleBlock { uint at[]; } visible;
-layout(set = 0, binding = 6, std430) buffer CounterBlock { uint at[]; } counters;
+layout(set = 0, binding = 6, std430) buffer LargeBlock { uint at[]; } large; // particles larger than a point, by class
 layout(constant_id = 0) const bool OCCLUSION_CULLING = true;
 layout(constant_id = 1) const bool BACK_SIDES = true;
 
@@ -51,5 +51,5 @@ void main() {
     visible.at[i] = verdict | (cls == CLASS_BODY ? VISIBLE_BODY : 0u);
     // One pixel more than the box, for the centre's rounding.
     float size = max(box.z - box.x, box.w - box.y) + 1.0;
-    if (verdict != 0u && size > float(frame.largest_point)) atomicAdd(counters.at[COUNT_LARGE_SPLASH + cls], 1u);
+    if (verdict != 0u && size > float(frame.largest_point)) atomicAdd(large.at[cls], 1u);
 }

@@ -9,6 +9,7 @@ layout(local_size_x = PARTICLE_GROUP) in;
 #include "positions.glsl"
 layout(set = 0, binding = 0, std430) buffer FrameBlock { Frame frame; };
 layout(set = 0, binding = 3, std430) buffer CounterBlock { uint at[]; } counters;
+layout(constant_id = 1) const uint COUNTERS = 0; // slot of its first counter
 
 // Integers in the order of the floats.
 uint ordered(float x) {
@@ -41,7 +42,7 @@ void main() {
         atomicMin(box[a], least[a]);
         atomicMax(box[3 + a], most[a]);
     }
-    if (lost > 0u) atomicAdd(counters.at[COUNT_NOT_FINITE], lost);
+    if (lost > 0u) atomicAdd(counters.at[COUNTERS], lost);
     barrier();
     uint t = gl_LocalInvocationIndex;
     if (t < 3u) atomicMin(extent.at[EXTENT_LEAST + t], box[t]);

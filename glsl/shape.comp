@@ -1,12 +1,14 @@
 // From neighbours to what is drawn: number density and class (Imai16 section 4.1), and for the body the ellipsoid of
-// YuTurk13. One invocation takes SHAPE_RUN particles that follow each other in the sorted order, those of one column of cells
-// together, one a component: what is looked up and read once serves all. Candidates are tested exactly, so that neighbours are
-// the same set however they are found.
+// YuTurk13 (docs/methods.md, "Preparation").
 //
-// Sorted cells: cells as wide as the support, so 5 x 5 runs of 5 cells. RELATION_TABLE: one run of the relation table, whose
-// cells are as wide as the reach.
+// One invocation takes SHAPE_RUN particles that follow each other in the sorted order. Those of them that lie in the same cell,
+// or in the next along z, are taken together, each in a component of a vector: what is looked up and read once serves all.
+//
+// Candidates for neighbours come in runs of the sorted order. Sorted cells are as wide as the support, so 5 x 5 runs of 5
+// cells hold all candidates. With RELATION_TABLE cells are as wide as the reach, and one run of the table holds them all.
+// Either way candidates are tested exactly, so that the neighbours are the same set.
 #version 460
-// Compiled with any of: NEIGHBOURS
+// Compiled with any of: NEIGHBOURS, KEEP_CLASSES
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"
@@ -18,11 +20,13 @@ layout(set = 0, binding = 5, std430) writeonly buffer CenterBlock { float at[]; 
 layout(set = 0, binding = 6, std430) writeonly buffer DiagonalBlock { float at[]; } diagonals;
 layout(set = 0, binding = 7, std430) writeonly buffer MixedBlock { float at[]; } mixed;
 layout(set = 0, binding = 8, std430) buffer CounterBlock { uint at[]; } counters;
+#ifdef KEEP_CLASSES
 layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_classes; // 0 splash, 1 body, by input index
+#endif
 #ifdef NEIGHBOURS
 layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[]; } neighbours;
 #endif
-layout(constant_id = 1) const bool KEEP_CLASSES = false;
+layout(constant_id = 1) const uint COUNTERS = 0; // slot of its first counter
 
 uint count() { return prepare.count; }
 vec3 sorted_position(uint k) { return vec3(sorted.at[3u * k], sorted.at[3u * k + 1u], sorted.at[3u * k + 2u]); }
@@ -183,25 +187,27 @@ void write(uint k, vec3 center, vec3 diagonal, vec3 mixed_part) {
 }
 
 // What has been counted here, added up once at the end.
-uint tally[COUNTERS - COUNT_SPLASH];
-void note(uint what) { ++tally[what - COUNT_SPLASH]; }
+// What becomes of particles; counted as such from COUNTERS on.
+const uint SPLASH = 0u, BODY = 1u, FEW_NEIGHBOURS = 2u, DEGENERATE = 3u, CLAMPED_LONG = 4u, CLAMPED_RATIO = 5u, FATES = 6u;
+uint tally[FATES];
+void note(uint what) { ++tally[what]; }
 
 // Whether particle k, of this fraction of a filled body's density, belongs to the body; keeps its class for the next frame.
 bool classify(uint k, float relative) {
     bool body = relative >= prepare.splash_below;
-    if (KEEP_CLASSES) {
-        uint i = input_index(k);
-        uint last = max(last_classes.at[i], 1u - prepare.has_last_classes); // without last classes as if all had been body
-        body = body && (relative >= prepare.keep_below || last != 0u);
-        last_classes.at[i] = body ? 1u : 0u;
-    }
+#ifdef KEEP_CLASSES
+    uint i = input_index(k);
+    uint last = max(last_classes.at[i], 1u - prepare.has_last_classes); // without last classes as if all had been body
+    body = body && (relative >= prepare.keep_below || last != 0u);
+    last_classes.at[i] = body ? 1u : 0u;
+#endif
     return body;
 }
 
 void write_sphere(uint k, vec3 center, uint why) {
     note(why);
     // The sign says which class.
-    write(k, center, vec3(why == COUNT_SPLASH ? -1.0 : 1.0, 1.0, 1.0), vec3(0.0));
+    write(k, center, vec3(why == SPLASH ? -1.0 : 1.0, 1.0, 1.0), vec3(0.0));
 }
 
 // YuTurk13's ellipsoid of particle k from its sums, those of component b; center in radii.
@@ -214,12 +220,12 @@ void write_ellipsoid(uint k, vec3 center, Sums s, uint b) {
     vec3 variance = vec3(a[0][0], a[1][1], a[2][2]);
     float most = max(variance.x, max(variance.y, variance.z)), least = most * prepare.least_ratio;
     if (most < DEGENERATE_VARIANCE * prepare.filled_variance) {
-        write_sphere(k, center, COUNT_DEGENERATE);
+        write_sphere(k, center, DEGENERATE);
         return;
     }
-    if (min(variance.x, min(variance.y, variance.z)) < least) note(COUNT_CLAMPED_RATIO);
+    if (min(variance.x, min(variance.y, variance.z)) < least) note(CLAMPED_RATIO);
     vec3 wanted = max(variance, vec3(least)) / prepare.filled_variance;
-    if (most / prepare.filled_variance > prepare.longest_axis) note(COUNT_CLAMPED_LONG);
+    if (most / prepare.filled_variance > prepare.longest_axis) note(CLAMPED_LONG);
     vec3 axes = min(wanted, vec3(prepare.longest_axis)), l = axes * axes;
     // S = V diag(l) V^T
     vec3 r0 = vec3(v[0].x, v[1].x, v[2].x), r1 = vec3(v[0].y, v[1].y, v[2].y), r2 = vec3(v[0].z, v[1].z, v[2].z);
@@ -233,11 +239,11 @@ void finish(uint k, vec3 x, Sums s, uint b) {
     float unit = 1.0 / prepare.radius;
     vec3 center = unit * (x - origin);
     if (!classify(k, s.density[b] / prepare.filled_density)) {
-        write_sphere(k, center, COUNT_SPLASH);
+        write_sphere(k, center, SPLASH);
         return;
     }
-    note(COUNT_BODY);
-    if (s.number[b] <= prepare.min_neighbours + 1u) write_sphere(k, center, COUNT_FEW_NEIGHBOURS);
+    note(BODY);
+    if (s.number[b] <= prepare.min_neighbours + 1u) write_sphere(k, center, FEW_NEIGHBOURS);
     else write_ellipsoid(k, center, s, b);
 }
 
@@ -345,7 +351,7 @@ Sums sum_over(Batch b, uint number) {
 }
 
 void main() {
-    for (uint c = 0u; c < COUNTERS - COUNT_SPLASH; ++c) tally[c] = 0u;
+    for (uint c = 0u; c < FATES; ++c) tally[c] = 0u;
     uint next = min(invocation() * SHAPE_RUN, count()), to = min(next + SHAPE_RUN, count());
     while (next < to) {
         uint from = next++;
@@ -371,7 +377,7 @@ void main() {
             finish(from + c, of(b.x, c), s, c);
         }
     }
-    for (uint c = 0u; c < COUNTERS - COUNT_SPLASH; ++c) {
-        if (tally[c] > 0u) atomicAdd(counters.at[COUNT_SPLASH + c], tally[c]);
+    for (uint c = 0u; c < FATES; ++c) {
+        if (tally[c] > 0u) atomicAdd(counters.at[COUNTERS + c], tally[c]);
     }
 }

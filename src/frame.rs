@@ -7,7 +7,7 @@ use crate::{
     input::{Background, EnvironmentShape},
     layers::Surfaces,
     method::Offers,
-    passes::{Arrays, compact, counters, cull, extent, occlude, shape, sort},
+    passes::{Arrays, compact, cull, extent, occlude, shape, sort},
     plan::{Home, Plan},
     shader, smooth,
 };
@@ -21,10 +21,6 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
     let method = &scene.settings.method;
     let mut surfaces = Surfaces::default();
     if scene.count > 0 {
-        plan.work_for(Home::View, "visibility");
-        let counters = counters(&mut plan);
-        plan.fill("reset", counters, 0, vk::WHOLE_SIZE, 0);
-
         plan.work_for(Home::Particles, "particles");
         let particles = match &scene.prepare {
             // From positions on the device: their box, their neighbours (Im16 §III), classes and ellipsoids (YuTurk13).
@@ -39,8 +35,8 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
         plan.work_for(Home::View, "visibility");
         // Which particles can show at all.
         let bounds = scene.occlusion().then(|| occlude::record(&mut plan, scene, &particles));
-        let visible = cull::record(&mut plan, scene, &particles, bounds);
-        let drawn = compact::record(&mut plan, scene, &particles, visible);
+        let culled = cull::record(&mut plan, scene, &particles, bounds);
+        let drawn = compact::record(&mut plan, scene, &particles, &culled);
         // The liquid's surfaces (Imai16 §4.2), the body's smoothed (Imai16 §4.3).
         plan.work_for(Home::View, "layers");
         let layered = method.layers.member().record(&mut plan, scene, &drawn);

@@ -2,8 +2,14 @@
 //! it to draw; the feature `inspect` brings it, with the CPU twins and the tables of shaders.
 
 use crate::{
-    Camera, Error, Renderer, Settings, frame::Scene, layers::Surfaces, plan::Plan, recorder::PlanEntry,
-    resources::Resource, shader::Frame, space::Space,
+    Camera, Error, Renderer, Settings,
+    frame::Scene,
+    layers::Surfaces,
+    plan::{COUNTERS, Plan},
+    recorder::PlanEntry,
+    resources::Resource,
+    shader::Frame,
+    space::Space,
 };
 pub use crate::{
     access::{Access, Barrier, State},
@@ -72,6 +78,12 @@ impl Renderer {
     /// Which targets hold the surfaces of the last frame.
     pub fn surfaces(&self) -> SurfaceNames {
         self.surfaces
+    }
+
+    /// The last frame's buffers of counters, and the names of their slots.
+    pub fn counters(&self) -> [(&'static str, Vec<&'static str>); 2] {
+        let [particles, view] = self.counters.clone();
+        [(COUNTERS[0], particles), (COUNTERS[1], view)]
     }
 
     /// Names of the targets and buffers of the last frame.

@@ -50,6 +50,9 @@ pub struct Renderer {
     /// Where the last frame's surfaces are.
     #[cfg(feature = "inspect")]
     pub(crate) surfaces: crate::inspect::SurfaceNames,
+    /// Names of the last frame's counters.
+    #[cfg(feature = "inspect")]
+    pub(crate) counters: [Vec<&'static str>; 2],
     /// Whether the last frame left classes.
     last_classes: bool,
 }
@@ -119,6 +122,8 @@ impl Renderer {
             inspection: Default::default(),
             #[cfg(feature = "inspect")]
             surfaces: Default::default(),
+            #[cfg(feature = "inspect")]
+            counters: Default::default(),
             last_classes: false,
         };
         for _ in 0..renderer.host.frames_in_flight {
@@ -305,7 +310,6 @@ impl Renderer {
             let shift = input.camera.view.w_axis.truncate() * space::power_of_two(p.radius);
             block.view.w_axis = shift.extend(1.0);
         }
-        input.check_handles()?;
         // Squares of distances are taken of it.
         if !block.view.w_axis.is_finite() || block.view.w_axis.abs().max_element() > FARTHEST_EYE {
             let remedy = format!("the eye is more than {FARTHEST_EYE:e} particle radii away: go nearer");
@@ -325,6 +329,7 @@ impl Renderer {
         if let Some(p) = &input.positions {
             self.check_bindings(&plan, p)?;
         }
+        input.check_handles()?;
         check_memory(&self.host, &self.limits, &self.tables, &plan)?;
         self.pipelines.make(&self.host, plan.recipes())?;
 
@@ -341,6 +346,7 @@ impl Renderer {
         #[cfg(feature = "inspect")]
         {
             self.surfaces = plan.surfaces;
+            self.counters = plan.counters.clone();
         }
 
         block.count = scene.count;

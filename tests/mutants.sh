@@ -1,32 +1,62 @@
 #!/usr/bin/env bash
-# Plants each mistake of tests/mutants.txt in turn and checks that the test named beside it fails. Ten seconds to a minute
-# each, so not part of every CI run. Works on a copy: your tree is not touched. An argument selects lines by pattern.
+# Plants each mistake of tests/mutants.txt in turn and checks that the test named beside it fails, having passed before. Half a
+# minute each, so CI plants a few of them at a time. Works on a copy: your tree is not touched.
+#   tests/mutants.sh                    all of them
+#   tests/mutants.sh PATTERN            lines that the extended regular expression finds
+#   tests/mutants.sh --sample 3 [DAY]   three of them: other ones each day (days since 1970 unless given), all in turn
 set -euo pipefail
 cd "$(dirname "$0")/.."
+mapfile -t lines < <(grep -v '^#' tests/mutants.txt | grep .)
+if [ "${1:-}" = --sample ]; then
+  day=${3:-$(($(date +%s) / 86400))} all=("${lines[@]}") lines=()
+  # Lines of one file lie together: steps of about a third of the list make a sample of different ones.
+  for ((k = 0; k < $2; k++)); do lines+=("${all[(day + k * ${#all[@]} / $2) % ${#all[@]}]}"); done
+  echo "day $day: ${#lines[@]} of ${#all[@]}; repeat with tests/mutants.sh --sample $2 $day"
+else
+  mapfile -t lines < <(printf '%s\n' "${lines[@]}" | grep -E -- "${1:-}")
+fi
+
 copy=$(mktemp -d)
 trap 'rm -rf "$copy"' EXIT
 git ls-files -z | xargs -0 cp --parents -t "$copy"
-mkdir -p target/mutants "$copy/target" && cp -r target/shaderc "$copy/target/"
-export CARGO_TARGET_DIR=$PWD/target/mutants
-survived=0 planted=0
-while IFS= read -r line; do
-  case $line in "#"* | "") continue ;; esac
-  [[ $line == *"${1:-}"* ]] || continue
+mkdir -p "$copy/target"
+for made in shaderc mesa25; do [ ! -e "target/$made" ] || ln -s "$PWD/target/$made" "$copy/target/$made"; done
+export CARGO_TARGET_DIR=$PWD/target/mutants SHADERC_LIB_DIR=${SHADERC_LIB_DIR:-$PWD/target/shaderc}
+# Dependencies are what they are: taken over from the usual build, where there is one. Ours are not.
+if [ ! -e target/mutants ] && [ -d target/debug/deps ]; then
+  (cd target && find debug/deps debug/build debug/.fingerprint -type f ! -path '*meniscus*' -regextype posix-extended \
+     ! -regex '.*/(gpu|cpu|cli|endurance|fuzz|embed)-[^/]*(/.*)?' -print0 |
+     { mkdir -p mutants && xargs -0 cp -l --parents -t mutants; })
+fi
+
+run() { # tests of one binary, in the copy
+  (cd "$copy" && timeout 900 cargo test --quiet --test "$1" -- --exact "${@:2}" > mutant.log 2>&1)
+}
+in_gpu=() in_endurance=()
+for line in "${lines[@]}"; do
+  test=${line##* ::: }
+  if [[ $test == endurance::* ]]; then in_endurance+=("${test#endurance::}"); else in_gpu+=("$test"); fi
+done
+# Without a mistake they pass, or their failing would say nothing.
+[ ${#in_gpu[@]} = 0 ] || run gpu "${in_gpu[@]}" || { tail -40 "$copy/mutant.log"; exit 1; }
+[ ${#in_endurance[@]} = 0 ] || run endurance "${in_endurance[@]}" || { tail -40 "$copy/mutant.log"; exit 1; }
+
+survived=0
+for line in "${lines[@]}"; do
   IFS=$'\t' read -r file from to test <<< "${line// ::: /$'\t'}"
   FROM=$from TO=$to perl -0pi -e 'my $n = s/\Q$ENV{FROM}\E/$ENV{TO}/g; die "$ARGV: found $n times: $ENV{FROM}\n" if $n != 1' "$copy/$file"
-  planted=$((planted + 1))
   binary=gpu
   [[ $test == endurance::* ]] && binary=endurance
-  if (cd "$copy" && cargo test --quiet --test "$binary" -- --exact "${test#endurance::}" > mutant.log 2>&1); then
+  if run "$binary" "${test#endurance::}"; then
     echo "SURVIVED  $file: $from -> $to ($test)"
     survived=$((survived + 1))
-  elif grep -q "error: could not compile" "$copy/mutant.log"; then
+  elif grep -q "could not compile\|custom build command" "$copy/mutant.log"; then
     echo "NOT BUILT $file: $from -> $to"
     survived=$((survived + 1))
   else
-    echo "caught    $file: $test"
+    echo "caught    $file: $from -> $to ($test)"
   fi
   cp "$file" "$copy/$file"
-done < tests/mutants.txt
-echo "$planted planted, $survived survived"
-[ "$survived" = 0 ] && [ "$planted" -gt 0 ]
+done
+echo "${#lines[@]} planted, $survived survived"
+[ "$survived" = 0 ] && [ "${#lines[@]}" -gt 0 ]

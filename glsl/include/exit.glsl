@@ -72,6 +72,19 @@ int hit_in(Ray ray, Wall wall, Bracket bracket, int outcome, out float t) {
     return OUTCOME_HOLE;
 }
 
+// What the march meets between two samples: an outcome, or -1 where the ray runs on.
+int met_between(Ray ray, Wall ahead, Wall opposite, Sample last, Sample next, bool inside, bool jumped, out float t, inout int side) {
+    if (next.opposite > tolerance.accepted && next.opposite < HOLE) {
+        Bracket bracket = Bracket(last.t, min(last.opposite, 0.0), next.t, next.opposite);
+        int outcome = hit_in(ray, opposite, bracket, OUTCOME_OPPOSITE_WALL, t);
+        if (outcome != OUTCOME_HOLE) side = opposite.side;
+        return outcome;
+    }
+    if (next.ahead < 0.0 || !inside) return -1;
+    Bracket bracket = Bracket(last.t, last.ahead, next.t, next.ahead);
+    return hit_in(ray, ahead, bracket, jumped ? OUTCOME_PAST_JUMP : OUTCOME_HIT, t);
+}
+
 // March: a pixel a stride near a wall, more where none can come near, then regula falsi. `on_wall`: the ray starts on the
 // wall ahead, not before it.
 int march(Ray ray, Wall ahead, Wall opposite, bool on_wall, out float t, out int side) {
@@ -96,21 +109,14 @@ int march(Ray ray, Wall ahead, Wall opposite, bool on_wall, out float t, out int
         float gap = min(-next.ahead, next.opposite < HOLE ? -next.opposite : HOLE);
         if (near) next.ahead = wall_distance(ray, ahead, next.t);
         if (near_opposite) next.opposite = wall_distance(ray, opposite, next.t);
-        if (next.opposite > tolerance.accepted && next.opposite < HOLE) {
-            Bracket bracket = Bracket(last.t, min(last.opposite, 0.0), next.t, next.opposite);
-            int outcome = hit_in(ray, opposite, bracket, OUTCOME_OPPOSITE_WALL, t);
-            if (outcome != OUTCOME_HOLE) side = opposite.side;
-            return outcome;
-        }
+        int met = met_between(ray, ahead, opposite, last, next, inside, jumped, t, side);
+        if (met >= 0) return met;
         if (next.ahead < 0.0) {
             float most = tolerance.jump * (1.0 + EXIT_PIXELS * stride / fine);
             jumped = jumped || (last.depth > 0.0 && abs(next.depth - last.depth) > most);
             inside = true;
             last = next;
             if (last.opposite >= HOLE) last.opposite = -1.0;
-        } else if (inside) {
-            Bracket bracket = Bracket(last.t, last.ahead, next.t, next.ahead);
-            return hit_in(ray, ahead, bracket, jumped ? OUTCOME_PAST_JUMP : OUTCOME_HIT, t);
         } else if (next_s >= 2.0 * fine) {
             t = 0.0;
             return OUTCOME_HOLE;

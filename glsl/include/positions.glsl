@@ -55,7 +55,8 @@ ivec3 cell_of(vec3 x) {
 uint entries() { return prepare.count * (RELATION_TABLE ? 27u : 1u); }
 uint blocks() { return (entries() + BLOCK - 1u) / BLOCK; }
 
-// Where in the order's two halves entries lie before a pass of the sort; before the one after the last lies its result.
+// The order buffer has two halves, and each pass of the sort reads one and writes the other. Where the half begins that a pass
+// reads; with the number of passes, where the half begins that holds the result.
 uint half_before(uint pass) { return (pass & 1u) * entries(); }
 
 // Which of the 27 cells around a particle's own an entry of the relation table stands for.
@@ -70,7 +71,7 @@ ivec3 entry_cell(uint e) {
     return cell_of(position(e));
 }
 
-// Adds an axis's bits to a key of three words.
+// Appends the lowest `bits` of a value to a key of three words, which has `length` bits so far.
 void append(inout uvec3 key, inout uint length, uint value, uint bits) {
     uint word = length >> 5, shift = length & 31u;
     if (bits > 0u) {
@@ -92,5 +93,5 @@ uvec3 sort_key(ivec3 whole) {
 
 uint key_bits() { return extent.at[EXTENT_BITS] + extent.at[EXTENT_BITS + 1] + extent.at[EXTENT_BITS + 2]; }
 
-// Where the half of the order begins that the sort does not leave its result in.
+// Where the half of the order begins that is free once the sort is done.
 uint free_half() { return half_before(extent.at[EXTENT_PASSES] + 1u); }

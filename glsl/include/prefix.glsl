@@ -1,8 +1,8 @@
-// Exclusive prefix sums of the counts that blocks of items left in `sums`: rows of `length` counts, one row a group of
-// PARTICLE_GROUP; the rows' totals follow the last row.
+// Exclusive prefix sums. `sums` holds rows of counts, one count for each block of items, and after the last row the total of
+// each row. One group of PARTICLE_GROUP threads takes one row.
 shared uint prefix_of[PARTICLE_GROUP];
 
-// Each thread's exclusive prefix of what the group's threads pass in.
+// The sum of what the threads before this one pass in, and the total of all.
 uint group_prefix(uint value, out uint total) {
     uint t = gl_LocalInvocationIndex;
     prefix_of[t] = value;

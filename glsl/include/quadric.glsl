@@ -1,5 +1,5 @@
-// A particle's ellipsoid in eye space and what it covers (Sigg06, in the eye's own tangent coordinates v = x/d
-// instead of clip space, and measured from the centre, so that nothing large cancels).
+// A particle's ellipsoid in eye space and what it covers (Sigg06; docs/methods.md, "Depth maps"). Sigg06 works in clip space;
+// here coordinates are v = x/d, and measured from the centre, so that nothing large cancels.
 struct Ellipsoid {
     vec3 center; // eye space
     vec3 sd;     // S = A A^T: xx, yy, zz

@@ -62,27 +62,6 @@
 // Items that one group of 64 sorts or compacts.
 #define BLOCK 1024
 
-// Slots of the counter buffer: guards and culling, summed over the frame.
-#define COUNT_SPLASH_FRONT 0
-#define COUNT_SPLASH_BACK 1
-#define COUNT_BODY_FRONT 2
-#define COUNT_BODY_BACK 3
-#define COUNT_FIT_ZERO_NORMAL 4
-#define COUNT_FIT_GRAZING 5
-#define COUNT_FIT_UNBOUNDED 6
-#define COUNT_NORMAL_DEGENERATE 7
-#define COUNT_LARGE_SPLASH 8
-#define COUNT_LARGE_BODY 9
-// Of the preparation: classes, and how ellipsoids came about.
-#define COUNT_SPLASH 10
-#define COUNT_BODY 11
-#define COUNT_NOT_FINITE 12
-#define COUNT_FEW_NEIGHBOURS 13
-#define COUNT_DEGENERATE 14
-#define COUNT_CLAMPED_LONG 15
-#define COUNT_CLAMPED_RATIO 16
-#define COUNTERS 17
-
 // Words of the extent buffer.
 // Smallest coordinates, as integers in the order of the floats.
 #define EXTENT_LEAST 0

@@ -83,6 +83,16 @@ impl<'a> Session<'a> {
         Ok(Some(data.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect()))
     }
 
+    /// What the last frame counted, by name.
+    pub fn counters(&mut self) -> Result<Vec<(&'static str, u32)>, HostError> {
+        let mut all = Vec::new();
+        for (buffer, names) in self.renderer.counters() {
+            let words = self.words(buffer, 0)?.unwrap_or_default();
+            all.extend(names.into_iter().zip(words));
+        }
+        Ok(all)
+    }
+
     /// Destroys the renderer.
     pub fn end(self) {
         let Session { renderer, .. } = self;

@@ -7,7 +7,7 @@ use crate::{
     input::{Background, EnvironmentShape},
     layers::Surfaces,
     plan::{Call, External, Plan, Rendering, Vertices},
-    shader::{LOOKUP_FRAG, REFRACT_VERT},
+    shader::{LOOKUP_FRAG, VIEW_VERT},
 };
 use glam::Vec3;
 
@@ -48,7 +48,7 @@ impl Lookup {
         let light = self.light.as_dvec3().normalize_or_zero().as_vec3();
         let light = scene.eye.transform_vector3(light);
         let [diffuse, specular, shininess] = self.phong;
-        let mut call = Call::draw(&REFRACT_VERT, &LOOKUP_FRAG[variant])
+        let mut call = Call::draw(&VIEW_VERT, &LOOKUP_FRAG[variant])
             .read("body_depth", body.depth)
             .read("body_normal", body.normal)
             .read("environment", plan.given(External::Environment))

@@ -7,7 +7,7 @@ use crate::{
     layers::{Surface, Surfaces},
     plan::{Call, External, Plan, Rendering, Target, Vertices},
     resources::ImageSpec,
-    shader::{REFRACT_FRAG, REFRACT_VERT},
+    shader::{VIEW_VERT, WALK_FRAG},
 };
 use ash::vk::Format;
 
@@ -45,7 +45,7 @@ impl Walk {
         let has_scene = scene.has_scene;
         let cube = scene.environment == EnvironmentShape::Cube;
         let variant = usize::from(scene.walks) + 2 * usize::from(has_scene) + 4 * usize::from(cube);
-        let mut call = Call::draw(&REFRACT_VERT, &REFRACT_FRAG[variant])
+        let mut call = Call::draw(&VIEW_VERT, &WALK_FRAG[variant])
             .read("body_depth", body.depth)
             .read("body_normal", body.normal)
             .read("splash_depth", splash.depth)

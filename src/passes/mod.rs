@@ -10,7 +10,7 @@ pub(crate) mod sort;
 
 use crate::{
     plan::{Call, External, Groups, Plan, Target},
-    shader::{BLOCK, COUNTERS, PARTICLE_GROUP},
+    shader::{BLOCK, PARTICLE_GROUP},
 };
 
 /// Particles as drawn: `glsl/include/particles.glsl`.
@@ -36,6 +36,15 @@ impl Arrays {
     }
 }
 
+/// What the cull pass says of them.
+#[derive(Clone, Copy)]
+pub(crate) struct Culled {
+    /// A word a particle: its class and the sides on which it shows.
+    pub visible: Target,
+    /// For each class how many particles are larger than a point can be.
+    pub large: Target,
+}
+
 /// What is left to draw of them.
 #[derive(Clone, Copy)]
 pub(crate) struct Drawn {
@@ -44,12 +53,6 @@ pub(crate) struct Drawn {
     pub lists: Target,
     /// Indirect draws of the lists.
     pub draws: Target,
-}
-
-/// The counters of guards and culling; zero when the frame starts.
-pub(crate) fn counters(plan: &mut Plan) -> Target {
-    const NAME: &str = "counters";
-    plan.find(NAME).unwrap_or_else(|| plan.buffer(NAME, 4 * u64::from(COUNTERS)))
 }
 
 /// A rectangle of at least so many groups, no longer than any device allows (`glsl/include/groups.glsl`).

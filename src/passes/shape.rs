@@ -1,11 +1,21 @@
 //! Number density, class and ellipsoid of each particle (`glsl/shape.comp`; Imai16 §4.1, YuTurk13).
 
-use super::{Arrays, counters, rectangle, sort::Sorted};
+use super::{Arrays, rectangle, sort::Sorted};
 use crate::{
     frame::{Preparation, Scene},
     plan::{Call, Plan, Target},
     shader::{PARTICLE_GROUP, SHAPE_COMP, SHAPE_RUN},
 };
+
+/// What becomes of particles, in the order of `glsl/shape.comp`.
+const COUNTED: [&str; 6] = [
+    "splash",
+    "body",
+    "ellipsoid_few_neighbours",
+    "ellipsoid_degenerate",
+    "ellipsoid_clamped_long",
+    "ellipsoid_clamped_ratio",
+];
 
 /// The array that keeps classes from frame to frame.
 pub(crate) const LAST_CLASSES: &str = "last classes";
@@ -24,22 +34,20 @@ pub(crate) fn record(
         diagonals: array("particle shapes (diagonal)"),
         mixed: array("particle shapes (mixed)"),
     };
-    let counters = counters(plan);
-    // Where no classes are kept the shader does not look, but something has to be bound.
-    let classes = if preparation.keep_classes { plan.array(LAST_CLASSES, 4 * count) } else { counters };
     let listed = preparation.neighbours > 0;
-    let mut call = Call::compute(&SHAPE_COMP[usize::from(listed)])
+    let mut call = Call::compute(&SHAPE_COMP[usize::from(listed) + 2 * usize::from(preparation.keep_classes)])
         .read("extent", extent)
         .read("order", sorted.order)
         .read("sorted", sorted.positions)
         .write("centers", arrays.centers)
         .write("diagonals", arrays.diagonals)
         .write("mixed", arrays.mixed)
-        .update("counters", counters)
-        .update("last_classes", classes)
+        .counting(&COUNTED)
         .constant("RELATION_TABLE", preparation.constants.entries_per_particle != 1)
-        .constant("KEEP_CLASSES", preparation.keep_classes)
         .push_all(&preparation.constants);
+    if preparation.keep_classes {
+        call = call.update("last_classes", plan.array(LAST_CLASSES, 4 * count));
+    }
     if listed {
         let lists = plan.array("neighbours (debug)", 4 * (2 + u64::from(preparation.neighbours)) * count);
         call = call.write("neighbours", lists);

@@ -92,6 +92,8 @@ pub(crate) struct Call {
     pub bound: Vec<(Binding, Target, Access)>,
     pub push: Vec<u8>,
     named: Vec<(&'static str, Target, Way)>,
+    /// What it counts.
+    pub(super) counts: &'static [&'static str],
     /// Members of the push-constant block that were set; the whole block at once is "".
     pushed: Vec<&'static str>,
     wrong: Option<String>,
@@ -114,7 +116,7 @@ impl Call {
             depth: false,
         };
         let push = vec![0; recipe.push_bytes() as usize];
-        Call { recipe, bound: Vec::new(), push, named: Vec::new(), pushed: Vec::new(), wrong: None }
+        Call { recipe, bound: Vec::new(), push, named: Vec::new(), counts: &[], pushed: Vec::new(), wrong: None }
     }
 
     pub fn compute(shader: &'static Shader) -> Call {
@@ -145,6 +147,12 @@ impl Call {
     /// … and is read and written.
     pub fn update(mut self, name: &'static str, target: Target) -> Call {
         self.named.push((name, target, Way::Update));
+        self
+    }
+
+    /// What the shader counts, from the slot COUNTERS of the buffer `counters` on.
+    pub fn counting(mut self, names: &'static [&'static str]) -> Call {
+        self.counts = names;
         self
     }
 

@@ -4,6 +4,9 @@ use super::{Declared, External, Home, Made, Plan, Target};
 use crate::resources::{ImageSpec, Spec};
 use ash::vk;
 
+/// The buffers of counters, of the particles and of the view.
+pub(crate) const COUNTERS: [&str; 2] = ["particle counters", "counters"];
+
 impl Plan {
     fn declare(&mut self, name: &'static str, made: Made, per_particle: bool) -> Target {
         if self.find(name).is_some() {
@@ -36,6 +39,33 @@ impl Plan {
     /// A buffer whose bytes grow with the number of particles.
     pub fn array(&mut self, name: &'static str, bytes: u64) -> Target {
         self.declare(name, Made::Own(Spec::Buffer { bytes, usage: Default::default() }), true)
+    }
+
+    /// The buffer that counts for the home at work, and the first of the slots that these names have in it. Names of a
+    /// frame's counters are unique, but for steps that count the same things.
+    pub(super) fn counters(&mut self, names: &'static [&'static str]) -> (Target, u32) {
+        let buffer = COUNTERS[self.home as usize];
+        let target = self.find(buffer).unwrap_or_else(|| self.buffer(buffer, 0));
+        let all = &mut self.counters[self.home as usize];
+        let first = all.windows(names.len()).position(|w| w == names).unwrap_or_else(|| {
+            all.extend(names);
+            all.len() - names.len()
+        });
+        (target, first as u32)
+    }
+
+    /// Counters are as many as were named, and start at zero.
+    pub(super) fn reset_counters(&mut self) {
+        for (home, name) in [Home::Particles, Home::View].into_iter().zip(COUNTERS) {
+            let Some(target) = self.find(name) else { continue };
+            let count = self.counters[home as usize].len() as u64;
+            if let Made::Own(Spec::Buffer { bytes, .. }) = &mut self.resources[target.0].made {
+                *bytes = 4 * count;
+            }
+            self.work_for(home, "reset");
+            self.fill("reset", target, 0, 4 * count, 0);
+            self.steps.rotate_right(1);
+        }
     }
 
     /// Something that is not the frame's own; the same one each time.

@@ -7,6 +7,8 @@ mod declare;
 mod step;
 
 pub(crate) use call::{Blend, Call, Recipe};
+#[cfg(feature = "inspect")]
+pub(crate) use declare::COUNTERS;
 pub(crate) use step::{Groups, Rendering, Step, Vertices, Work};
 
 use crate::{
@@ -65,6 +67,8 @@ pub(crate) struct Plan {
     pub size: [u32; 2],
     pub resources: Vec<Declared>,
     pub steps: Vec<Step>,
+    /// Names of the counters of each home.
+    pub counters: [Vec<&'static str>; 2],
     /// Where the surfaces are that light meets.
     #[cfg(feature = "inspect")]
     pub surfaces: crate::inspect::SurfaceNames,
@@ -81,6 +85,7 @@ impl Plan {
             size,
             resources: Vec::new(),
             steps: Vec::new(),
+            counters: Default::default(),
             #[cfg(feature = "inspect")]
             surfaces: Default::default(),
             home: Home::Particles,
@@ -96,6 +101,7 @@ impl Plan {
 
     /// The plan, unless a pass declared something that cannot be.
     pub fn finish(mut self) -> Result<Plan, Error> {
+        self.reset_counters();
         // Whatever can be copied may be asked for afterwards.
         #[cfg(feature = "inspect")]
         for declared in &mut self.resources {

@@ -121,8 +121,13 @@ impl Step {
 
 impl Plan {
     fn step(&mut self, pass: &'static str, uses: Vec<(Target, Access)>, work: Work) {
-        for (target, access) in &uses {
+        for (i, (target, access)) in uses.iter().enumerate() {
             self.used(pass, *target, *access);
+            let twice = uses[..i].iter().find(|(other, _)| other == target);
+            if twice.is_some_and(|(_, other)| other.writes() || access.writes()) {
+                let name = self.resource(*target).name;
+                self.refuse(pass, format!("{name} is written in one step and used in it once more"));
+            }
         }
         let (home, part) = (self.home, self.part);
         self.steps.push(Step { pass, home, part, uses, work });
@@ -135,6 +140,10 @@ impl Plan {
 
     /// A dispatch of a compute shader.
     pub fn dispatch(&mut self, pass: &'static str, mut call: Call, groups: Groups) {
+        if !call.counts.is_empty() {
+            let (counters, first) = self.counters(call.counts);
+            call = call.update("counters", counters).constant("COUNTERS", first);
+        }
         match call.bind(self) {
             Ok(mut uses) => {
                 if let Groups::Indirect(arguments, _) = groups {

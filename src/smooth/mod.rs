@@ -1,8 +1,15 @@
 //! How the body's surfaces are smoothed. A filter takes their depths and gives the target that holds the result.
 
+pub mod bilateral;
+pub mod bilateral_separable;
+pub mod binomial;
+pub mod curvature_flow;
+pub mod narrow_range;
 pub mod none;
-mod normals;
+pub mod normals;
 pub mod plane_fit;
+#[cfg(feature = "inspect")]
+pub mod twin;
 
 use crate::{
     layers::{Body, Surface},
@@ -10,11 +17,17 @@ use crate::{
     parameters::family,
     plan::{Groups, Plan, Target},
 };
+use ash::vk::Format;
 
 family! {
     /// How the body's surfaces are smoothed.
     pub enum Smooth: Filter {
         PlaneFit(plane_fit) = "plane-fit",
+        Bilateral(bilateral) = "bilateral",
+        BilateralSeparable(bilateral_separable) = "bilateral-separable",
+        Binomial(binomial) = "binomial",
+        CurvatureFlow(curvature_flow) = "curvature-flow",
+        NarrowRange(narrow_range) = "narrow-range",
         Unsmoothed(none) = "none",
     }
 }
@@ -27,6 +40,50 @@ pub(crate) trait Filter {
     }
     /// Smooths the depths of all sides of the body; gives the target that holds the result, which may be the body's own.
     fn record(&self, plan: &mut Plan, body: &Body) -> Target;
+    /// How many times depths go through a shader on the way to the result.
+    #[cfg(feature = "inspect")]
+    fn steps(&self) -> u32;
+    /// The target beside the depths that one of these times, counted from 0, reads.
+    #[cfg(feature = "inspect")]
+    fn beside(&self, _step: u32) -> Option<&'static str> {
+        None
+    }
+    /// What one of these times, counted from 0, makes of the depths of one side: the same in 64 bits.
+    #[cfg(feature = "inspect")]
+    fn twin(&self, step: u32, input: &twin::Input) -> Vec<twin::Pixel>;
+}
+
+#[cfg(feature = "inspect")]
+impl Smooth {
+    /// How many times depths go through a shader on the way to the result.
+    pub fn steps(&self) -> u32 {
+        self.member().steps()
+    }
+
+    /// The target beside the depths that one of these times, counted from 0, reads.
+    pub fn beside(&self, step: u32) -> Option<&'static str> {
+        self.member().beside(step)
+    }
+
+    /// The CPU twin of one of these times, counted from 0.
+    pub fn twin(&self, step: u32, input: &twin::Input) -> Vec<twin::Pixel> {
+        self.member().twin(step, input)
+    }
+}
+
+/// Takes the body's depths through so many steps, each from the target that the last one wrote to another; there are two
+/// of these, and the first step reads the body's own. Gives the last.
+fn alternate(plan: &mut Plan, body: &Body, steps: u32, mut step: impl FnMut(&mut Plan, u32, Target, Target)) -> Target {
+    let names = ["body depth (smoothed, odd)", "body depth (smoothed, even)"];
+    let targets: Vec<_> =
+        names.into_iter().take(steps as usize).map(|name| plan.map(name, Format::R32_SFLOAT, body.sides)).collect();
+    let mut from = body.depth;
+    for i in 0..steps {
+        let to = targets[i as usize % 2];
+        step(plan, i, from, to);
+        from = to;
+    }
+    from
 }
 
 /// The body, smoothed: its depths by the filter, its normals from them.

@@ -16,4 +16,14 @@ impl Filter for Unsmoothed {
     fn record(&self, _: &mut Plan, body: &Body) -> Target {
         body.depth
     }
+
+    #[cfg(feature = "inspect")]
+    fn steps(&self) -> u32 {
+        0
+    }
+
+    #[cfg(feature = "inspect")]
+    fn twin(&self, _: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
+        input.depth.iter().map(|d| super::twin::Pixel::kept(*d)).collect()
+    }
 }

@@ -1,9 +1,11 @@
-//! Normals of the smoothed body (`glsl/normals.comp`; Green10).
+//! Normals of the smoothed body (`glsl/smooth/normals.comp`; Green10).
+
+#[cfg(feature = "inspect")]
+pub mod twin;
 
 use super::per_pixel;
 use crate::{
     layers::Body,
-    passes::counters,
     plan::{Call, Plan, Target},
     shader::{IMAGE_GROUP, NORMALS_COMP},
 };
@@ -12,11 +14,10 @@ use ash::vk::Format;
 /// From depths, as a filter left them.
 pub(super) fn record(plan: &mut Plan, body: &Body, depth: Target) -> Target {
     let normal = plan.map("body normal (smoothed)", Format::R32_UINT, body.sides);
-    let counters = counters(plan);
     let mut call = Call::compute(&NORMALS_COMP[usize::from(body.normal.is_some())])
         .read("depth_in", depth)
         .write("normal_out", normal)
-        .update("counters", counters);
+        .counting(&["normals_lone_pixel"]);
     // Where differences say nothing the particle's own normal stays, if there is one.
     if let Some(raw) = body.normal {
         call = call.read("normal_raw", raw);

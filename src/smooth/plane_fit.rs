@@ -1,15 +1,16 @@
-//! Smoothing by iterative plane fitting (`glsl/plane_fit.comp`; Imai16 §4.3).
+//! Smoothing by iterative plane fitting (`glsl/smooth/plane_fit.comp`; Imai16 §4.3).
 
-use super::{Filter, per_pixel};
+#[cfg(feature = "inspect")]
+pub mod twin;
+
+use super::{Filter, alternate, per_pixel};
 use crate::{
     layers::Body,
     method::Offers,
     parameters::{choices, parameters},
-    passes::counters,
     plan::{Call, Plan, Target},
     shader::PLANE_FIT_COMP,
 };
-use ash::vk::Format;
 
 choices! {
     /// Weights of plane fitting (Imai16 fig. 5).
@@ -50,23 +51,14 @@ impl Filter for PlaneFit {
     fn record(&self, plan: &mut Plan, body: &Body) -> Target {
         let reach = self.window / 2;
         let edge = tile(reach);
-        let counters = counters(plan);
         // Asked for, so there (`Filter::asks`).
         let Some(normal) = body.normal else { return body.depth };
-        let mut from = body.depth;
-        // The two that iterations alternate between; the second only if there is a second iteration.
-        let mut targets = ["body depth (smoothed, odd)", "body depth (smoothed, even)"]
-            .into_iter()
-            .take(self.iterations as usize)
-            .map(|name| plan.map(name, Format::R32_SFLOAT, body.sides))
-            .collect::<Vec<_>>();
-        for _ in 0..self.iterations {
-            let to = targets[0];
+        alternate(plan, body, self.iterations, |plan, _, from, to| {
             let call = Call::compute(&PLANE_FIT_COMP)
                 .read("depth_in", from)
                 .read("normal_raw", normal)
                 .write("depth_out", to)
-                .update("counters", counters)
+                .counting(&["plane_fit_zero_normal_sum", "plane_fit_grazing", "plane_fit_update_too_long"])
                 .constant("local_size_x", edge)
                 .constant("local_size_y", edge)
                 .constant("HALF_WINDOW", reach)
@@ -74,9 +66,16 @@ impl Filter for PlaneFit {
                 .push("sigma", self.sigma);
             let groups = per_pixel(plan, edge, body.sides);
             plan.dispatch("plane fit", call, groups);
-            from = to;
-            targets.rotate_left(1);
-        }
-        from
+        })
+    }
+
+    #[cfg(feature = "inspect")]
+    fn steps(&self) -> u32 {
+        self.iterations
+    }
+
+    #[cfg(feature = "inspect")]
+    fn twin(&self, _: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
+        twin::pixels(self, input)
     }
 }

@@ -55,8 +55,9 @@ impl Tolerance {
     }
 }
 
-/// Samples of the march: pixels, and depth in particle radii, that one step may cover.
+/// Pixels that one step of the march may cover.
 const STEP_PIXELS: f64 = 0.125;
+/// Depth that one step of the march may cover, in particle radii.
 const STEP_DEPTH: f64 = 0.125;
 
 /// Where a search ended.

@@ -5,7 +5,7 @@ use crate::{
     support::{Choose, Shot, camera, each_driver, random_cloud},
 };
 use glam::Vec3;
-use meniscus::{shader::COUNT_SPLASH_FRONT, twin::compact::compact};
+use meniscus::twin::compact::compact;
 
 /// The lists as the splat pass reads them: `[2 * class + side]`.
 fn lists(shot: &Shot) -> [Vec<u32>; 4] {
@@ -40,7 +40,7 @@ fn lists_are_the_verdicts_in_order() {
             let got = lists(&shot);
             for l in 0..4 {
                 assert_eq!(got[l], want[l], "{}: {splash} + {body}: list {l}", driver.name);
-                assert_eq!(shot.counter(COUNT_SPLASH_FRONT + l as u32) as usize, want[l].len());
+                assert_eq!(shot.counter(crate::cull::DRAWN[l]) as usize, want[l].len());
             }
             assert!(i < 2 || got.iter().any(|l| !l.is_empty()), "{splash} + {body}: nothing shows");
         }

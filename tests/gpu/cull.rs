@@ -9,11 +9,12 @@ use glam::{Mat3, Vec3};
 use meniscus::{
     Camera, Ellipsoid, Particles,
     prepare::{Input, Options, prepare},
-    shader::{
-        CLASS_BODY, CLASS_SPLASH, COUNT_SPLASH_FRONT, SIDE_BACK, SIDE_FRONT, VISIBLE_BACK, VISIBLE_BODY, VISIBLE_FRONT,
-    },
+    shader::{CLASS_BODY, CLASS_SPLASH, SIDE_BACK, SIDE_FRONT, VISIBLE_BACK, VISIBLE_BODY, VISIBLE_FRONT},
     twin::{cull::cull, splat::splat},
 };
+
+/// Counters of what is drawn, by class and side.
+pub const DRAWN: [&str; 4] = ["splash_drawn_front", "splash_drawn_back", "body_drawn_front", "body_drawn_back"];
 
 /// Every layer of depth and normals and the picture have the same bits.
 pub fn assert_same(a: &Shot, b: &Shot, what: &str) {
@@ -94,7 +95,7 @@ fn check(driver: &Driver, case: &Case, what: &str) -> Shot {
         // The words and the counters come from the same shader: these agree exactly.
         for side in [SIDE_FRONT, SIDE_BACK] {
             let count = got.iter().filter(|v| *v & (1 << side) != 0).count();
-            assert_eq!(shot.counter(COUNT_SPLASH_FRONT + 2 * class + side) as usize, count, "{label} side {side}");
+            assert_eq!(shot.counter(DRAWN[(2 * class + side) as usize]) as usize, count, "{label} side {side}");
         }
         let limit = point_size(driver);
         if (want.largest_point - limit).abs() > 0.1 {
@@ -123,7 +124,7 @@ fn changes_no_bit(driver: &Driver, case: &Case, what: &str) -> [f64; 2] {
     assert!(off.words("body depth bounds", 0).is_none(), "nothing is bounded that nobody reads");
     assert_same(&on, &off, &format!("{}: {what}", driver.name));
     [SIDE_FRONT, SIDE_BACK].map(|side| {
-        let drawn = |shot: &Shot| f64::from(shot.counter(COUNT_SPLASH_FRONT + 2 * CLASS_BODY + side));
+        let drawn = |shot: &Shot| f64::from(shot.counter(DRAWN[(2 * CLASS_BODY + side) as usize]));
         1.0 - drawn(&on) / drawn(&off)
     })
 }

@@ -5,8 +5,7 @@ use glam::Vec3;
 use meniscus::{
     prepare::Search,
     shader::{
-        COUNT_NOT_FINITE, EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_LEAST, EXTENT_MOST, EXTENT_ORIGIN,
-        EXTENT_PASSES,
+        EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_LEAST, EXTENT_MOST, EXTENT_ORIGIN, EXTENT_PASSES,
     },
     twin::extent::{Kept, extent, kept},
 };
@@ -32,7 +31,7 @@ fn boxes_cells_and_bits_are_the_twins() {
                     assert_eq!((cells.0.map(|c| c as i32), cells.1.map(|c| c as i32)), want.cells, "{label}");
                     assert_eq!(three(EXTENT_BITS), want.bits, "{label}");
                     assert_eq!(words[EXTENT_PASSES as usize], want.bits.iter().sum::<u32>().div_ceil(5), "{label}");
-                    assert_eq!(shot.counter(COUNT_NOT_FINITE), want.lost, "{label}");
+                    assert_eq!(shot.counter("not_finite"), want.lost, "{label}");
                 }
             }
         }

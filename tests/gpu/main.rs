@@ -16,6 +16,7 @@ mod plane_fit;
 mod refract;
 mod shape;
 mod smoke;
+mod smooth;
 mod sort;
 mod space;
 mod splat;

@@ -2,8 +2,9 @@
 
 use crate::support::{Case, Choose, Driver, camera, each_driver, lattice, random_cloud, sphere};
 use glam::Vec3;
-use meniscus::shader::{COUNT_NORMAL_DEGENERATE, SIDE_BACK};
-use meniscus::twin::{normal::decode_normal, normals::normals, plane_fit::view_ray};
+use meniscus::shader::SIDE_BACK;
+use meniscus::smooth::{normals::twin::normals, plane_fit::twin::view_ray};
+use meniscus::twin::normal::decode_normal;
 use meniscus::{Particles, Settings};
 
 /// 0.004 degrees for each of two roundings to a code, and as much for 32-bit differences.
@@ -55,7 +56,7 @@ fn check(driver: &Driver, name: &str, case: &Case) -> u32 {
     );
     assert!(ties * 100 <= seen, "{}, {name}: {ties} of {seen} are ties", driver.name);
     // Exact: whether there are neighbours does not depend on rounding.
-    assert_eq!(shot.counter(COUNT_NORMAL_DEGENERATE), degenerate, "{}, {name}", driver.name);
+    assert_eq!(shot.counter("normals_lone_pixel"), degenerate, "{}, {name}", driver.name);
     degenerate
 }
 

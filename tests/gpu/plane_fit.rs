@@ -2,18 +2,15 @@
 
 use crate::support::{Case, Choose, Driver, Random, Shot, camera, each_driver, lattice, random_cloud, sphere};
 use glam::{Mat3, Vec3};
-use meniscus::shader::{
-    COUNT_FIT_GRAZING, COUNT_FIT_UNBOUNDED, COUNT_FIT_ZERO_NORMAL, FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT,
-};
+use meniscus::smooth::plane_fit::twin::{Outcome, is_close, plane_fit, rounding};
 use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
-use meniscus::twin::plane_fit::{LEAST_AGREEMENT, Outcome, Plane, plane_fit};
 use meniscus::{Camera, Ellipsoid, Particles, Settings};
 
 /// Guards in the order of their counters.
-const GUARDS: [(Outcome, u32); 3] = [
-    (Outcome::ZeroNormal, COUNT_FIT_ZERO_NORMAL),
-    (Outcome::Grazing, COUNT_FIT_GRAZING),
-    (Outcome::Unbounded, COUNT_FIT_UNBOUNDED),
+const GUARDS: [(Outcome, &str); 3] = [
+    (Outcome::ZeroNormal, "plane_fit_zero_normal_sum"),
+    (Outcome::Grazing, "plane_fit_grazing"),
+    (Outcome::Unbounded, "plane_fit_update_too_long"),
 ];
 
 /// What a comparison found.
@@ -38,33 +35,6 @@ fn settings(window: u32, iterations: u32, sigma: f32, weighting: Weighting) -> S
     }
 }
 
-/// Error of eq. (5) in 32 bits. Storage rounds by half a step of the depth. The fraction is one of sums whose terms (up
-/// to the depth itself sideways; weights leave about sigma of rise) are rounded to a step or two of the largest; what
-/// it is divided by is n.v times the length of the sum of normals.
-fn rounding(fit: &PlaneFit, own: f32, plane: &Plane) -> f64 {
-    let [own, sigma] = [own, fit.sigma].map(f64::from);
-    let magnitude = own + (plane.depth - own).abs() + sigma;
-    f64::from(f32::EPSILON) * magnitude * (0.5 + 2.0 / (plane.facing * plane.agreement))
-}
-
-/// Whether rounding decides if a guard fires.
-fn is_close(fit: &PlaneFit, shot: &Shot, own: f32, plane: &Plane) -> bool {
-    let limits = [FIT_UPDATE_LIMIT * fit.sigma, FIT_GRAZING_LIMIT, shot.frame.near];
-    let [limit, grazing, near] = limits.map(f64::from);
-    if (plane.agreement - LEAST_AGREEMENT).abs() < 5e-7 {
-        return true;
-    }
-    if plane.agreement < LEAST_AGREEMENT {
-        return false;
-    }
-    if (plane.facing - grazing).abs() < 1e-6 / plane.agreement {
-        return true;
-    }
-    let slack = rounding(fit, own, plane);
-    let update = (plane.depth - f64::from(own)).abs();
-    plane.facing > grazing && ((update - limit).abs() < slack || (plane.depth - near).abs() < slack)
-}
-
 /// Compares one iteration on both layers, from image `from` of one shot to image `to` of another (or the same one).
 fn compare(label: &str, settings: &PlaneFit, from: (&Shot, &'static str), to: (&Shot, &'static str)) -> Seen {
     let shot = to.0;
@@ -86,7 +56,7 @@ fn compare(label: &str, settings: &PlaneFit, from: (&Shot, &'static str), to: (&
             for (count, (guard, _)) in seen.guards.iter_mut().zip(GUARDS) {
                 *count += u32::from(outcome == guard);
             }
-            let undecided = is_close(settings, shot, input[i], plane);
+            let undecided = is_close(settings, &shot.frame, input[i], plane);
             seen.close += u32::from(undecided);
             if kept && (undecided || outcome != Outcome::Fitted) {
                 continue;

@@ -6,9 +6,6 @@ use glam::Vec3;
 use meniscus::{
     Class, Particles, Settings,
     prepare::{Input, Options, Search, classify, prepare},
-    shader::{
-        COUNT_BODY, COUNT_CLAMPED_LONG, COUNT_CLAMPED_RATIO, COUNT_DEGENERATE, COUNT_FEW_NEIGHBOURS, COUNT_SPLASH,
-    },
     twin::shape::neighbours,
 };
 
@@ -142,10 +139,13 @@ fn agrees(driver: &Driver, name: &str, radius: f32, positions: &[Vec3], options:
         assert!(miss <= tolerance, "{label}: particle {i} is {miss} off: {center} {d} {m}");
     }
     println!("{label}: worst {worst}");
-    let counted = [COUNT_SPLASH, COUNT_BODY, COUNT_FEW_NEIGHBOURS, COUNT_DEGENERATE].map(|c| shot.counter(c) as usize);
+    let counted =
+        ["splash", "body", "ellipsoid_few_neighbours", "ellipsoid_degenerate"].map(|c| shot.counter(c) as usize);
     let known = [report.splash, report.body, report.few_neighbours, report.degenerate];
     assert_eq!(counted, known, "{label}");
-    for (slot, known) in [(COUNT_CLAMPED_LONG, report.clamped_long), (COUNT_CLAMPED_RATIO, report.clamped_ratio)] {
+    for (slot, known) in
+        [("ellipsoid_clamped_long", report.clamped_long), ("ellipsoid_clamped_ratio", report.clamped_ratio)]
+    {
         // A length that equals its limit may be cut or not.
         let got = shot.counter(slot) as usize;
         assert!(
@@ -256,7 +256,7 @@ fn what_is_not_finite_is_left_out() {
         for search in [Search::Runs, Search::Relation] {
             let shot = driver.shoot_cloud(&empty(radius), &Cloud::new(&holed, search));
             let clean = driver.shoot_cloud(&empty(radius), &Cloud::new(&finite, search));
-            for slot in [COUNT_SPLASH, COUNT_BODY, COUNT_FEW_NEIGHBOURS] {
+            for slot in ["splash", "body", "ellipsoid_few_neighbours"] {
                 assert_eq!(shot.counter(slot), clean.counter(slot), "{}: {search:?}", driver.name);
             }
             let nothing =

@@ -184,7 +184,7 @@ fn crowds_take_no_longer_than_liquid() {
             (driver.shoot(&case), driver.shoot_cloud_unlisted(&case, &Cloud::new(&positions, Search::Runs)));
         println!("{}: {} s", driver.name, start.elapsed().as_secs_f64());
         for (what, shot) in [("host", &host), ("device", &device)] {
-            let drawn = shot.counter(meniscus::shader::COUNT_BODY_FRONT);
+            let drawn = shot.counter("body_drawn_front");
             assert_eq!(drawn, 3, "{}: {what}: {drawn} drawn", driver.name);
             assert!(shot.floats("body depth (ray-cast)", 0).expect("drawn").iter().filter(|d| **d > 0.0).count() > 100);
         }

@@ -48,6 +48,7 @@ pub struct Shot {
     pub size: [u32; 2],
     pub picture: Vec<[f32; 3]>,
     targets: HashMap<(&'static str, u32), Vec<u32>>,
+    counters: Vec<(&'static str, u32)>,
 }
 
 impl Shot {
@@ -67,8 +68,8 @@ impl Shot {
         self.words(name, layer).map(|w| w.iter().map(world).collect())
     }
 
-    pub fn counter(&self, slot: u32) -> u32 {
-        self.words("counters", 0).expect("there were particles")[slot as usize]
+    pub fn counter(&self, name: &str) -> u32 {
+        self.counters.iter().find(|(n, _)| *n == name).unwrap_or_else(|| panic!("nothing counts {name}")).1
     }
 }
 
@@ -167,7 +168,8 @@ impl<'a> Driver<'a> {
         };
         let mut frame = inspect::uniforms(&case.camera, &case.settings, case.size, &space, bounds);
         frame.eye_inside = f32::from(case.eye_inside);
-        Shot { frame, space, size: case.size, picture, targets }
+        let counters = session.counters().expect("counters");
+        Shot { frame, space, size: case.size, picture, targets, counters }
     }
 }
 

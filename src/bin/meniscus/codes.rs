@@ -23,14 +23,3 @@ pub const OUTCOMES: &[(u32, &str)] = &[
     (s::OUTCOME_OPPOSITE_WALL, "other wall: all surfaces found, one of them through the map behind the ray"),
     (s::OUTCOME_SCENE, "met the host's scene"),
 ];
-
-pub const COUNTERS: &[(u32, &str)] = &[
-    (s::COUNT_SPLASH_FRONT, "splash_drawn_front"),
-    (s::COUNT_SPLASH_BACK, "splash_drawn_back"),
-    (s::COUNT_BODY_FRONT, "body_drawn_front"),
-    (s::COUNT_BODY_BACK, "body_drawn_back"),
-    (s::COUNT_FIT_ZERO_NORMAL, "plane_fit_zero_normal_sum"),
-    (s::COUNT_FIT_GRAZING, "plane_fit_grazing"),
-    (s::COUNT_FIT_UNBOUNDED, "plane_fit_update_too_long"),
-    (s::COUNT_NORMAL_DEGENERATE, "normals_lone_pixel"),
-];

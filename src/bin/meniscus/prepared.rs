@@ -48,15 +48,15 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     }
     let splash_count = splash.len();
     let (ellipsoids, index) = splash.into_iter().chain(body).unzip();
-    let counters = session.words("counters", 0)?.unwrap_or_else(|| vec![0; s::COUNTERS as usize]);
-    let count = |slot: u32| counters[slot as usize] as usize;
+    let counters = session.counters()?;
+    let count = |name: &str| counters.iter().find(|c| c.0 == name).map_or(0, |c| c.1 as usize);
     let report = Report {
-        splash: count(s::COUNT_SPLASH),
-        body: count(s::COUNT_BODY),
-        few_neighbours: count(s::COUNT_FEW_NEIGHBOURS),
-        degenerate: count(s::COUNT_DEGENERATE),
-        clamped_long: count(s::COUNT_CLAMPED_LONG),
-        clamped_ratio: count(s::COUNT_CLAMPED_RATIO),
+        splash: count("splash"),
+        body: count("body"),
+        few_neighbours: count("ellipsoid_few_neighbours"),
+        degenerate: count("ellipsoid_degenerate"),
+        clamped_long: count("ellipsoid_clamped_long"),
+        clamped_ratio: count("ellipsoid_clamped_ratio"),
     };
     Ok(Prepared { particles: Particles { radius, ellipsoids, splash_count }, report, index })
 }

@@ -1,12 +1,13 @@
-//! Twin of `glsl/plane_fit.comp`: one iteration of plane fitting (Imai16 §4.3) on one layer of the body.
+//! Twin of `glsl/smooth/plane_fit.comp`: one iteration of plane fitting (Imai16 §4.3) on one layer of the body.
 //!
 //! The shader measures everything from the pixel's own point so that nothing large cancels in 32 bits; here the
 //! formulas stand as printed, in 64 bits, on eye-space points.
 
-use super::normal::decode_normal;
+use super::{PlaneFit, Weighting};
 use crate::{
     shader::{FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT, Frame},
-    smooth::plane_fit::{PlaneFit, Weighting},
+    smooth::twin::{Input, Pixel},
+    twin::normal::decode_normal,
 };
 use glam::{DVec2, DVec3};
 
@@ -130,4 +131,48 @@ fn judge(frame: &Frame, p: &PlaneFit, own: f32, plane: &Plane) -> Outcome {
 pub fn view_ray(frame: &Frame, x: i32, y: i32) -> DVec3 {
     let center = DVec2::new(f64::from(x), f64::from(y)) + 0.5;
     ((center - frame.pixel_origin.as_dvec2()) / frame.pixel_scale.as_dvec2()).extend(-1.0)
+}
+
+/// Error of eq. (5) in 32 bits. Storage rounds by half a step of the depth. The fraction is one of sums whose terms (up
+/// to the depth itself sideways; weights leave about sigma of rise) are rounded to a step or two of the largest; what
+/// it is divided by is n.v times the length of the sum of normals.
+pub fn rounding(p: &PlaneFit, own: f32, plane: &Plane) -> f64 {
+    let [own, sigma] = [own, p.sigma].map(f64::from);
+    let magnitude = own + (plane.depth - own).abs() + sigma;
+    f64::from(f32::EPSILON) * magnitude * (0.5 + 2.0 / (plane.facing * plane.agreement))
+}
+
+/// Whether rounding decides if a guard fires.
+pub fn is_close(p: &PlaneFit, frame: &Frame, own: f32, plane: &Plane) -> bool {
+    let limits = [FIT_UPDATE_LIMIT * p.sigma, FIT_GRAZING_LIMIT, frame.near];
+    let [limit, grazing, near] = limits.map(f64::from);
+    if (plane.agreement - LEAST_AGREEMENT).abs() < 5e-7 {
+        return true;
+    }
+    if plane.agreement < LEAST_AGREEMENT {
+        return false;
+    }
+    if (plane.facing - grazing).abs() < 1e-6 / plane.agreement {
+        return true;
+    }
+    let slack = rounding(p, own, plane);
+    let update = (plane.depth - f64::from(own)).abs();
+    plane.facing > grazing && ((update - limit).abs() < slack || (plane.depth - near).abs() < slack)
+}
+
+/// The same as every filter's twin gives it: where rounding decides whether a guard fires, a pixel is where it was or on
+/// its plane.
+pub(super) fn pixels(p: &PlaneFit, input: &Input) -> Vec<Pixel> {
+    let fit = plane_fit(input.frame, input.depth, input.normal, p);
+    let pixel = |(i, plane): (usize, &Option<Plane>)| {
+        let own = input.depth[i];
+        let Some(plane) = plane else { return Pixel::kept(own) };
+        let on_plane = Pixel { depth: plane.depth, slack: rounding(p, own, plane), or: None };
+        match (is_close(p, input.frame, own, plane), fit.outcome[i]) {
+            (true, _) => Pixel { or: Some(f64::from(own)), ..on_plane },
+            (false, Outcome::Fitted) => on_plane,
+            _ => Pixel::kept(own),
+        }
+    };
+    fit.plane.iter().enumerate().map(pixel).collect()
 }

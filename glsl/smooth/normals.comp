@@ -14,6 +14,7 @@ layout(set = 0, binding = 2) uniform utexture2DArray normal_raw; // where differ
 #endif
 layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2DArray normal_out;
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
+layout(constant_id = 0) const uint COUNTERS = 0; // slot of its first counter
 
 float depth_at(ivec2 p, int layer) {
     if (any(lessThan(p, ivec2(0))) || any(greaterThanEqual(p, ivec2(frame.size)))) return 0.0;
@@ -49,7 +50,7 @@ void main() {
 #else
             result = encode_normal((layer == SIDE_BACK ? 1.0 : -1.0) * normalize(v));
 #endif
-            atomicAdd(counters.at[COUNT_NORMAL_DEGENERATE], 1u);
+            atomicAdd(counters.at[COUNTERS], 1u);
         }
     }
     imageStore(normal_out, ivec3(pixel, layer), uvec4(result));

@@ -1,8 +1,10 @@
-//! Twin of `glsl/normals.comp`: normals of a smoothed depth map from one-sided differences (Green10).
+//! Twin of `glsl/smooth/normals.comp`: normals of a smoothed depth map from one-sided differences (Green10).
 
-use super::normal::encode_normal;
-use super::plane_fit::view_ray;
-use crate::shader::{Frame, SIDE_BACK};
+use crate::{
+    shader::{Frame, SIDE_BACK},
+    smooth::plane_fit::twin::view_ray,
+    twin::normal::encode_normal,
+};
 use glam::DVec3;
 
 /// One layer's normals.

@@ -1,0 +1,62 @@
+//! The bilateral filter over a square window, iterated (`glsl/smooth/bilateral.comp`; Imai14, as Imai16 §3.1 has it).
+
+#[cfg(feature = "inspect")]
+pub mod twin;
+
+use super::{Filter, alternate, per_pixel};
+use crate::{
+    layers::Body,
+    parameters::parameters,
+    plan::{Call, Plan, Target},
+    shader::BILATERAL_COMP,
+};
+
+parameters! {
+    /// The bilateral filter over a square window, iterated (Imai14). Imai16 §3.1 prints none of its numbers: these are what
+    /// Truong18's own program compares with.
+    pub struct Bilateral {
+        /// Largest edge of the window
+        window: u32 = 55, "pixels", "an odd number from 3 to 55" => |w| w % 2 == 1 && (3..=55).contains(w);
+        /// Standard deviation of the weights across the image
+        sigma_space: f32 = 0.5 / 3.0, "particle radii, or pixels", "a finite value above 0"
+            => |s| s.is_finite() && *s > 0.0;
+        /// Standard deviation of the weights in depth
+        sigma_depth: f32 = 10.0 / 3.0, "particle radii", "a finite value above 0" => |s| s.is_finite() && *s > 0.0;
+        /// Whether sigma_space is a length at the pixel's depth, and the window three of it to either side
+        projected: bool = true, "", "true or false" => |_| true;
+        /// How often it is applied
+        iterations: u32 = 3, "", "0 to 20" => |n| *n <= 20;
+    }
+}
+
+impl Filter for Bilateral {
+    fn record(&self, plan: &mut Plan, body: &Body) -> Target {
+        let reach = self.window / 2;
+        // Four bytes an entry of the group's tile have to fit the guaranteed 16 KiB of shared memory.
+        let edge = if reach <= 23 { 16 } else { 8 };
+        alternate(plan, body, self.iterations, |plan, _, from, to| {
+            let call = Call::compute(&BILATERAL_COMP)
+                .read("depth_in", from)
+                .write("depth_out", to)
+                .counting(&["bilateral_kernel_clipped"])
+                .constant("local_size_x", edge)
+                .constant("local_size_y", edge)
+                .constant("REACH", reach)
+                .constant("PROJECTED", self.projected)
+                .push("sigma_space", self.sigma_space)
+                .push("sigma_depth", self.sigma_depth);
+            let groups = per_pixel(plan, edge, body.sides);
+            plan.dispatch("bilateral", call, groups);
+        })
+    }
+
+    #[cfg(feature = "inspect")]
+    fn steps(&self) -> u32 {
+        self.iterations
+    }
+
+    #[cfg(feature = "inspect")]
+    fn twin(&self, _: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
+        twin::bilateral(input.frame, input.depth, &self.into())
+    }
+}

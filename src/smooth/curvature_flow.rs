@@ -1,0 +1,51 @@
+//! Smoothing by mean curvature flow, in explicit steps (`glsl/smooth/curvature_flow.comp`; vdLaan09).
+
+#[cfg(feature = "inspect")]
+pub mod twin;
+
+use super::{Filter, alternate, per_pixel};
+use crate::{
+    layers::Body,
+    parameters::parameters,
+    plan::{Call, Plan, Target},
+    shader::{CURVATURE_FLOW_COMP, IMAGE_GROUP},
+};
+
+parameters! {
+    /// Mean curvature flow in explicit steps, none across a depth jump (vdLaan09). No time step is printed; this one is
+    /// stable where a particle's radius covers ten pixels, and shortened where it would not be.
+    pub struct CurvatureFlow {
+        /// Length of a step
+        time_step: f32 = 0.05, "particle radii times pixels", "a finite value of at least 0"
+            => |t| t.is_finite() && *t >= 0.0;
+        /// Depth difference from one pixel to the next across which nothing flows
+        jump: f32 = 5.0, "particle radii", "0 to 1000" => |j| (0.0..=1000.0).contains(j);
+        /// Steps
+        iterations: u32 = 60, "", "0 to 1000" => |n| *n <= 1000;
+    }
+}
+
+impl Filter for CurvatureFlow {
+    fn record(&self, plan: &mut Plan, body: &Body) -> Target {
+        alternate(plan, body, self.iterations, |plan, _, from, to| {
+            let call = Call::compute(&CURVATURE_FLOW_COMP)
+                .read("depth_in", from)
+                .write("depth_out", to)
+                .counting(&["curvature_flow_step_shortened", "curvature_flow_before_near_plane"])
+                .push("time_step", self.time_step)
+                .push("jump", self.jump);
+            let groups = per_pixel(plan, IMAGE_GROUP, body.sides);
+            plan.dispatch("curvature flow", call, groups);
+        })
+    }
+
+    #[cfg(feature = "inspect")]
+    fn steps(&self) -> u32 {
+        self.iterations
+    }
+
+    #[cfg(feature = "inspect")]
+    fn twin(&self, _: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
+        twin::curvature_flow(input.frame, input.depth, &self.into())
+    }
+}

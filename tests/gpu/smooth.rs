@@ -1,0 +1,129 @@
+//! Every smoothing filter against its twin, which is fed the depths that the GPU itself read, step by step.
+
+use crate::support::{Case, Choose, Driver, Shot, camera, each_driver, lattice, random_cloud};
+use glam::Vec3;
+use meniscus::{
+    Particles, Settings,
+    smooth::{Smooth, twin::Input},
+};
+
+const SIZE: [u32; 2] = [75, 53];
+const RAW: &str = "body depth (ray-cast)";
+const STEPS: [&str; 2] = ["body depth (smoothed, odd)", "body depth (smoothed, even)"];
+
+/// Parameters beside the defaults: each kind of a filter is to be among them, and each kind of step the last or the only.
+const KINDS: &[(&str, &[(&str, &str)])] = &[
+    ("plane-fit", &[("window", "7"), ("iterations", "1")]),
+    ("bilateral", &[("iterations", "1"), ("sigma_space", "0.8"), ("window", "9")]),
+    ("bilateral", &[("iterations", "2"), ("projected", "false"), ("sigma_space", "2"), ("window", "49")]),
+    ("bilateral-separable", &[("sigma_space", "0.6"), ("sigma_depth", "0.5")]),
+    ("bilateral-separable", &[("iterations", "2"), ("projected", "false"), ("sigma_space", "3"), ("window", "15")]),
+    ("binomial", &[("window", "5")]),
+    ("binomial", &[("kernel", "2"), ("iterations", "2")]),
+    ("binomial", &[("kernel", "0.7"), ("silhouette_map", "false")]),
+    ("curvature-flow", &[("iterations", "1"), ("time_step", "0.3")]),
+    ("curvature-flow", &[("iterations", "2"), ("jump", "0.2")]),
+    ("narrow-range", &[("shape", "square"), ("iterations", "1"), ("kernel", "1.5"), ("threshold", "0.7")]),
+    ("narrow-range", &[("shape", "square"), ("iterations", "2"), ("empty_far", "true"), ("window", "5")]),
+    ("narrow-range", &[("iterations", "1"), ("kernel", "2"), ("threshold", "0.5"), ("clamp", "0.3")]),
+    ("narrow-range", &[("iterations", "2"), ("empty_far", "true")]),
+];
+
+/// Every member as it comes, and the kinds.
+fn filters() -> Vec<(String, Smooth)> {
+    let mut all: Vec<_> = Smooth::all().into_iter().map(|f| (f.name().to_owned(), f)).collect();
+    for (name, values) in KINDS {
+        let mut filter = Smooth::named(name).expect("a filter");
+        for (parameter, value) in *values {
+            filter.parameters_mut().set(parameter, value).expect("a parameter");
+        }
+        all.push((format!("{name} {values:?}"), filter));
+    }
+    all
+}
+
+/// A step on one side, from one target to another; how many pixels it changed.
+fn compare(label: &str, filter: &Smooth, shot: &Shot, step: u32, side: u32) -> usize {
+    let from = if step == 0 { RAW } else { STEPS[(step as usize - 1) % 2] };
+    let (depth, found) = (shot.floats(from, side).unwrap(), shot.floats(STEPS[step as usize % 2], side).unwrap());
+    let normal = shot.words("body normal (ray-cast)", side).unwrap_or_default();
+    let beside = filter.beside(step).map(|name| shot.floats(name, side).expect(name)).unwrap_or_default();
+    let want = filter.twin(step, &Input { frame: &shot.frame, depth: &depth, normal, beside: &beside });
+    let mut changed = 0;
+    for (i, pixel) in want.iter().enumerate() {
+        let at = || format!("{label}, step {step}, side {side}, pixel {}, {}", i as u32 % SIZE[0], i as u32 / SIZE[0]);
+        assert!(pixel.admits(found[i]), "{}: {} became {}, not {pixel:?}", at(), depth[i], found[i]);
+        assert!(depth[i] > 0.0 || found[i].to_bits() == depth[i].to_bits(), "{}: nothing to smooth", at());
+        changed += usize::from(found[i] != depth[i]);
+    }
+    changed
+}
+
+fn check(driver: &Driver, name: &str, case: &Case, least: usize) {
+    for (kind, filter) in filters() {
+        let mut case = case.clone();
+        case.settings.method.smooth = filter;
+        case.settings.validate().expect("in range");
+        let shot = driver.shoot(&case);
+        let (steps, mut changed) = (filter.steps(), 0);
+        let label = format!("{}: {name}: {kind}", driver.name);
+        for side in 0..2 {
+            // What the last step read is still there; what the first one wrote, if there were two.
+            for step in (0..steps).filter(|s| s + 1 == steps || (*s == 0 && steps == 2)) {
+                changed += compare(&label, &filter, &shot, step, side);
+            }
+        }
+        assert!(steps == 0 || changed >= least, "{label}: only {changed} pixels change");
+    }
+}
+
+fn case(particles: Particles, eye: Vec3) -> Case {
+    let settings = Settings::default().refractions(2).reflections(0);
+    Case { particles, camera: camera(eye, Vec3::ZERO, SIZE), settings, size: SIZE, eye_inside: false }
+}
+
+#[test]
+fn a_rough_body() {
+    let particles = random_cloud(4, 0.12, Vec3::new(-0.9, -0.6, -0.9), Vec3::new(0.9, 0.6, 0.9), 0, 260);
+    let case = case(particles, Vec3::new(0.4, 0.9, 2.2));
+    each_driver(|driver| check(driver, "rough", &case, 500));
+}
+
+#[test]
+fn blocks_one_before_the_other() {
+    let mut ellipsoids = lattice(Vec3::new(-0.3, 0.0, -1.5), 0.1, [9, 6, 3]);
+    ellipsoids.extend(lattice(Vec3::new(0.4, 0.2, 0.9), 0.06, [5, 4, 2]));
+    let case = case(Particles { radius: 0.1, ellipsoids, splash_count: 0 }, Vec3::new(0.2, 0.4, 2.4));
+    each_driver(|driver| check(driver, "blocks", &case, 300));
+}
+
+/// Depths pass through that say that the eye is in a particle.
+#[test]
+fn the_eye_among_particles() {
+    let mut particles = random_cloud(9, 0.2, Vec3::splat(-1.0), Vec3::splat(1.0), 0, 120);
+    particles.ellipsoids.push(crate::support::sphere(Vec3::new(0.0, 0.0, 0.9), 0.2));
+    let case = case(particles, Vec3::new(0.0, 0.0, 0.95));
+    each_driver(|driver| {
+        let shot = driver.shoot(&case);
+        let inside = shot.floats(RAW, 0).unwrap().iter().filter(|d| **d < 0.0).count();
+        assert!(inside > 100, "{}: {inside} pixels", driver.name);
+        check(driver, "eye inside", &case, 50);
+    });
+}
+
+/// A frame hardly larger than a kernel, with one pixel and with one row.
+#[test]
+fn small_pictures() {
+    let particles = random_cloud(3, 0.3, Vec3::splat(-0.5), Vec3::splat(0.5), 0, 20);
+    each_driver(|driver| {
+        for size in [[1, 1], [9, 1], [2, 7]] {
+            for (kind, filter) in filters() {
+                let mut case = case(particles.clone(), Vec3::new(0.1, 0.2, 2.0));
+                (case.size, case.camera) = (size, camera(Vec3::new(0.1, 0.2, 2.0), Vec3::ZERO, size));
+                case.settings.method.smooth = filter;
+                let shot = driver.shoot(&case);
+                assert!(shot.picture.as_flattened().iter().all(|v| v.is_finite()), "{}: {kind}: {size:?}", driver.name);
+            }
+        }
+    });
+}
