@@ -2,9 +2,14 @@
 //! it to draw; the feature `inspect` brings it, with the CPU twins and the tables of shaders.
 
 use crate::{
-    Camera, Error, Renderer, Settings, frame::Scene, layers::Surfaces, plan::{COUNTERS, Plan},
+    Camera, Error, Renderer, Settings,
+    frame::Scene,
+    layers::Surfaces,
+    plan::{COUNTERS, Plan},
     recorder::PlanEntry,
-    resources::Resource, shader::Frame, space::Space,
+    resources::Resource,
+    shader::Frame,
+    space::Space,
 };
 pub use crate::{
     access::{Access, Barrier, State},

@@ -7,7 +7,7 @@ use crate::{
     layers::{Surface, Surfaces},
     plan::{Call, External, Plan, Rendering, Target, Vertices},
     resources::ImageSpec,
-    shader::{WALK_FRAG, VIEW_VERT},
+    shader::{VIEW_VERT, WALK_FRAG},
 };
 use ash::vk::Format;
 

@@ -73,12 +73,7 @@ impl Smooth {
 
 /// Takes the body's depths through so many steps, each from the target that the last one wrote to another; there are two
 /// of these, and the first step reads the body's own. Gives the last.
-fn alternate(
-    plan: &mut Plan,
-    body: &Body,
-    steps: u32,
-    mut step: impl FnMut(&mut Plan, u32, Target, Target),
-) -> Target {
+fn alternate(plan: &mut Plan, body: &Body, steps: u32, mut step: impl FnMut(&mut Plan, u32, Target, Target)) -> Target {
     let names = ["body depth (smoothed, odd)", "body depth (smoothed, even)"];
     let targets: Vec<_> =
         names.into_iter().take(steps as usize).map(|name| plan.map(name, Format::R32_SFLOAT, body.sides)).collect();

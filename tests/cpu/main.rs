@@ -10,8 +10,8 @@ mod house;
 #[cfg(feature = "io")]
 mod io;
 mod prepare;
-mod smooth;
 mod shared_blocks;
+mod smooth;
 mod twin_normals;
 mod twin_optics;
 mod twin_plane_fit;

@@ -3,8 +3,8 @@
 use crate::twin_plane_fit::{frame, plane, tilted};
 use glam::{DVec3, Vec3};
 use meniscus::shader::{SIDE_BACK, SIDE_FRONT};
-use meniscus::twin::normal::{decode_normal, encode_normal};
 use meniscus::smooth::{normals::twin::normals, plane_fit::twin::view_ray};
+use meniscus::twin::normal::{decode_normal, encode_normal};
 
 const SIZE: [u32; 2] = [61, 47];
 

@@ -3,10 +3,10 @@
 use glam::{DVec3, Vec3};
 use meniscus::inspect::uniforms;
 use meniscus::shader::Frame;
+use meniscus::smooth::plane_fit::twin::{Fit, Outcome, plane_fit, view_ray};
 use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
 use meniscus::space::Space;
 use meniscus::twin::normal::{decode_normal, encode_normal};
-use meniscus::smooth::plane_fit::twin::{Fit, Outcome, plane_fit, view_ray};
 use meniscus::{Camera, Settings};
 
 const SIZE: [u32; 2] = [61, 47];

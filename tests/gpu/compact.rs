@@ -5,7 +5,7 @@ use crate::{
     support::{Choose, Shot, camera, each_driver, random_cloud},
 };
 use glam::Vec3;
-use meniscus::{twin::compact::compact};
+use meniscus::twin::compact::compact;
 
 /// The lists as the splat pass reads them: `[2 * class + side]`.
 fn lists(shot: &Shot) -> [Vec<u32>; 4] {

@@ -9,9 +9,7 @@ use glam::{Mat3, Vec3};
 use meniscus::{
     Camera, Ellipsoid, Particles,
     prepare::{Input, Options, prepare},
-    shader::{
-        CLASS_BODY, CLASS_SPLASH, SIDE_BACK, SIDE_FRONT, VISIBLE_BACK, VISIBLE_BODY, VISIBLE_FRONT,
-    },
+    shader::{CLASS_BODY, CLASS_SPLASH, SIDE_BACK, SIDE_FRONT, VISIBLE_BACK, VISIBLE_BODY, VISIBLE_FRONT},
     twin::{cull::cull, splat::splat},
 };
 

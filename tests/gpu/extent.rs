@@ -5,8 +5,7 @@ use glam::Vec3;
 use meniscus::{
     prepare::Search,
     shader::{
-        EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_LEAST, EXTENT_MOST, EXTENT_ORIGIN,
-        EXTENT_PASSES,
+        EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_LEAST, EXTENT_MOST, EXTENT_ORIGIN, EXTENT_PASSES,
     },
     twin::extent::{Kept, extent, kept},
 };

@@ -2,7 +2,7 @@
 
 use crate::support::{Case, Choose, Driver, camera, each_driver, lattice, random_cloud, sphere};
 use glam::Vec3;
-use meniscus::shader::{SIDE_BACK};
+use meniscus::shader::SIDE_BACK;
 use meniscus::smooth::{normals::twin::normals, plane_fit::twin::view_ray};
 use meniscus::twin::normal::decode_normal;
 use meniscus::{Particles, Settings};

@@ -139,10 +139,13 @@ fn agrees(driver: &Driver, name: &str, radius: f32, positions: &[Vec3], options:
         assert!(miss <= tolerance, "{label}: particle {i} is {miss} off: {center} {d} {m}");
     }
     println!("{label}: worst {worst}");
-    let counted = ["splash", "body", "ellipsoid_few_neighbours", "ellipsoid_degenerate"].map(|c| shot.counter(c) as usize);
+    let counted =
+        ["splash", "body", "ellipsoid_few_neighbours", "ellipsoid_degenerate"].map(|c| shot.counter(c) as usize);
     let known = [report.splash, report.body, report.few_neighbours, report.degenerate];
     assert_eq!(counted, known, "{label}");
-    for (slot, known) in [("ellipsoid_clamped_long", report.clamped_long), ("ellipsoid_clamped_ratio", report.clamped_ratio)] {
+    for (slot, known) in
+        [("ellipsoid_clamped_long", report.clamped_long), ("ellipsoid_clamped_ratio", report.clamped_ratio)]
+    {
         // A length that equals its limit may be cut or not.
         let got = shot.counter(slot) as usize;
         assert!(

@@ -49,7 +49,7 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     let splash_count = splash.len();
     let (ellipsoids, index) = splash.into_iter().chain(body).unzip();
     let counters = session.counters()?;
-    let count = |name| counters.iter().find(|(n, _)| *n == name).map_or(0, |(_, count)| *count as usize);
+    let count = |name: &str| counters.iter().find(|c| c.0 == name).map_or(0, |c| c.1 as usize);
     let report = Report {
         splash: count("splash"),
         body: count("body"),

@@ -21,7 +21,9 @@ pub fn write(
         table.iter().map(|(code, name)| ((*name).to_owned(), json!(counts[*code as usize]))).collect::<Map<_, _>>()
     };
     let mut guards = Map::new();
-    guards.extend(session.counters()?.into_iter().map(|(name, count)| (name.to_owned(), json!(count))));
+    // Those of particles are in the report, wherever they were prepared.
+    let counted = session.counters()?.into_iter().filter(|(name, _)| !["splash", "body"].contains(name));
+    guards.extend(counted.map(|(name, count)| (name.to_owned(), json!(count))));
     let direction = session.words("final direction (debug)", 0)?.unwrap_or_default();
     let flipped: f64 = direction.chunks_exact(4).map(|d| f64::from(f32::from_bits(d[3]))).sum();
     guards.insert("walk_normal_faced_the_wrong_way".into(), json!(flipped));

@@ -21,7 +21,12 @@ pub struct Parameters {
 
 impl From<&Bilateral> for Parameters {
     fn from(p: &Bilateral) -> Parameters {
-        Parameters { sigma_space: p.sigma_space, sigma_depth: p.sigma_depth, reach: p.window / 2, projected: p.projected }
+        Parameters {
+            sigma_space: p.sigma_space,
+            sigma_depth: p.sigma_depth,
+            reach: p.window / 2,
+            projected: p.projected,
+        }
     }
 }
 

@@ -26,14 +26,14 @@ pub struct Parameters {
 
 impl From<&NarrowRange> for Parameters {
     fn from(p: &NarrowRange) -> Parameters {
-        Parameters { 
+        Parameters {
             kernel: p.kernel,
             threshold: p.threshold,
             clamp: p.clamp,
             reach: p.window / 2,
             fixed: false,
             empty_far: p.empty_far,
-         }
+        }
     }
 }
 

@@ -12,7 +12,13 @@ pub fn frame(pixels: f32, depth: f32) -> Frame {
     let angle = 2.0 * (SIZE[1] as f32 / (2.0 * pixels * depth)).atan();
     let camera = Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, angle, SIZE[0] as f32 / SIZE[1] as f32, 0.01);
     let size = SIZE.map(|n| n as u32);
-    meniscus::inspect::uniforms(&camera, &Settings::default(), size, &Space::new(1.0, Vec3::ZERO), (Vec3::ZERO, Vec3::ONE))
+    meniscus::inspect::uniforms(
+        &camera,
+        &Settings::default(),
+        size,
+        &Space::new(1.0, Vec3::ZERO),
+        (Vec3::ZERO, Vec3::ONE),
+    )
 }
 
 pub fn at((x, y): (i32, i32)) -> usize {
