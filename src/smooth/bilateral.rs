@@ -12,13 +12,13 @@ use crate::{
 };
 
 parameters! {
-    /// The bilateral filter over a square window, iterated (Imai14). Imai16 §3.1 prints none of its numbers: these are what
-    /// Truong18's own program compares with.
+    /// The bilateral filter over a square window, iterated (Imai14). Imai16 §3.1 prints none of its numbers.
+    /// The depths' spread is what Truong18's program compares with; the image's is ours, as wide as a particle.
     pub struct Bilateral {
         /// Largest edge of the window
         window: u32 = 55, "pixels", "an odd number from 3 to 55" => |w| w % 2 == 1 && (3..=55).contains(w);
         /// Standard deviation of the weights across the image
-        sigma_space: f32 = 0.5 / 3.0, "particle radii, or pixels", "a finite value above 0"
+        sigma_space: f32 = 1.0, "particle radii, or pixels", "a finite value above 0"
             => |s| s.is_finite() && *s > 0.0;
         /// Standard deviation of the weights in depth
         sigma_depth: f32 = 10.0 / 3.0, "particle radii", "a finite value above 0" => |s| s.is_finite() && *s > 0.0;

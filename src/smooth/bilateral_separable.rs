@@ -12,12 +12,13 @@ use crate::{
 };
 
 parameters! {
-    /// The bilateral filter as if it were separable: rows, then columns (Green10, whose slides print no numbers).
+    /// The bilateral filter as if it were separable: rows, then columns (Green10, whose slides print no
+    /// numbers: these are the other bilateral filter's).
     pub struct BilateralSeparable {
         /// Largest edge of the window
         window: u32 = 55, "pixels", "an odd number from 3 to 129" => |w| w % 2 == 1 && (3..=129).contains(w);
         /// Standard deviation of the weights across the image
-        sigma_space: f32 = 0.5 / 3.0, "particle radii, or pixels", "a finite value above 0"
+        sigma_space: f32 = 1.0, "particle radii, or pixels", "a finite value above 0"
             => |s| s.is_finite() && *s > 0.0;
         /// Standard deviation of the weights in depth
         sigma_depth: f32 = 10.0 / 3.0, "particle radii", "a finite value above 0" => |s| s.is_finite() && *s > 0.0;
