@@ -114,7 +114,20 @@ pub struct Preset {
 }
 
 /// The published methods; the first is what is drawn when nothing is said.
-pub const PRESETS: &[Preset] = &[Preset { name: "imai16", members: ["split", "plane-fit", "four"], values: &[] }];
+pub const PRESETS: &[Preset] = &[
+    Preset { name: "imai16", members: ["split", "plane-fit", "four"], values: &[] },
+    // Reflections inside are followed by none of the papers; the default of `four` goes beyond its own.
+    Preset {
+        name: "imai14",
+        members: ["nearest-farthest", "bilateral", "two"],
+        values: &[("internal_reflections", "0")],
+    },
+    Preset { name: "cords08", members: ["front", "binomial", "instant-liquids"], values: &[] },
+    Preset { name: "green10", members: ["front", "bilateral-separable", "ssfr"], values: &[] },
+    Preset { name: "im16", members: ["front", "bilateral-separable", "ssfr-index"], values: &[] },
+    Preset { name: "narrow-range", members: ["front", "narrow-range", "ssfr"], values: &[] },
+    Preset { name: "curvature-flow", members: ["front", "curvature-flow", "ssfr"], values: &[] },
+];
 
 impl Preset {
     /// The choices it stands for.

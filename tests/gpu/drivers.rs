@@ -246,9 +246,10 @@ fn what_is_left_fails_the_run() {
     let (said, success) = run(&["drivers::a_buffer_is_left", SOUND]);
     assert!(said.contains("2 passed") && !success, "{said}");
     for label in &POOL.labels {
-        let reported = said.lines().any(|l| l.starts_with(&format!("{label}: ")) && l.contains("VkBuffer"));
-        assert!(reported, "{label} is not among them: {said}");
+        assert!(said.lines().any(|l| l.starts_with(&format!("{label}: "))), "{label} is not among them: {said}");
     }
+    // Some layers name it in the same line, some in the next.
+    assert!(said.lines().filter(|l| l.contains("VkBuffer")).count() >= POOL.labels.len(), "{said}");
     let (said, success) = run(&[SOUND]);
     assert!(said.contains("1 passed") && success, "{said}");
 }

@@ -27,12 +27,10 @@ struct Seen {
 
 /// Settings for these tests: cheap optics, which come after what is tested, and both sides.
 fn settings(window: u32, iterations: u32, sigma: f32, weighting: Weighting) -> Settings {
-    {
-        let mut settings = Settings::default().refractions(2).reflections(0);
-        let fit = PlaneFit::default().window(window).iterations(iterations).sigma(sigma).weighting(weighting);
-        settings.method.smooth = fit.into();
-        settings
-    }
+    let mut settings = Settings::default().refractions(2).reflections(0);
+    let fit = PlaneFit::default().window(window).iterations(iterations).sigma(sigma).weighting(weighting);
+    settings.method.smooth = fit.into();
+    settings
 }
 
 /// Compares one iteration on both layers, from image `from` of one shot to image `to` of another (or the same one).
