@@ -35,7 +35,7 @@ impl Space {
         Space::new(particles.radius, most.get(most.len() / 2).map_or(Vec3::ZERO, |e| e.center))
     }
 
-    /// Of particles that the device prepared, from the words of [`crate::targets::Id::Extent`].
+    /// Of particles that the device prepared, from the words of the buffer "extent".
     pub fn prepared(radius: f32, extent: &[u32]) -> Space {
         let scale = f64::from(power_of_two(radius));
         let at = |axis: u32| f64::from(f32::from_bits(extent[(EXTENT_ORIGIN + axis) as usize])) / scale;

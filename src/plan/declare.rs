@@ -62,7 +62,7 @@ impl Plan {
             if let Made::Own(Spec::Buffer { bytes, .. }) = &mut self.resources[target.0].made {
                 *bytes = 4 * count;
             }
-            self.work_for(home, "reset");
+            self.work_for(home, "visibility");
             self.fill("reset", target, 0, 4 * count, 0);
             self.steps.rotate_right(1);
         }
