@@ -24,6 +24,7 @@ pub enum Access {
     /// Arguments of an indirect draw or dispatch.
     IndirectRead,
     /// Source of a copy.
+    #[cfg_attr(not(feature = "inspect"), expect(dead_code, reason = "frames are only copied to be looked at"))]
     TransferRead,
     /// Destination of a copy, fill or update.
     TransferWrite,

@@ -70,6 +70,11 @@ pub fn uniforms(camera: &Camera, settings: &Settings, size: [u32; 2], space: &Sp
 }
 
 impl Renderer {
+    /// Pipelines that were made so far.
+    pub fn pipelines(&self) -> usize {
+        self.pipelines.len()
+    }
+
     /// Says what frames to come write beside the picture.
     pub fn inspect(&mut self, inspection: Inspection) {
         self.inspection = inspection;

@@ -37,7 +37,7 @@
 //!
 //! # Spaces and units
 //!
-//! World units are the scene's own; shaders measure in particle radii (see [`space`]), so that any scale gives the same
+//! World units are the scene's own; shaders measure in particle radii, so that any scale gives the same
 //! picture. Eye space is right-handed and looks down -z; *linear depth* is `d = -z_eye > 0`. Colours are linear; a UNORM output is encoded as sRGB in the last shader, a float output is not.
 #![warn(missing_docs)]
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -75,6 +75,9 @@ mod shader;
 pub mod shader;
 mod slot;
 pub mod smooth;
+#[cfg(not(feature = "inspect"))]
+mod space;
+#[cfg(feature = "inspect")]
 pub mod space;
 mod table;
 #[cfg(feature = "inspect")]
@@ -94,4 +97,5 @@ pub use particles::{Class, Ellipsoid, Particles};
 pub use recorder::PlanEntry;
 pub use renderer::Renderer;
 pub use settings::{Camera, Drawing, Liquid, Settings};
+pub use space::RADII;
 pub use table::LedgerEntry;

@@ -61,6 +61,11 @@ impl Pipelines {
         first_error
     }
 
+    #[cfg(feature = "inspect")]
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
     pub fn get(&self, recipe: &Recipe) -> Option<&Pipeline> {
         self.0.get(recipe)
     }

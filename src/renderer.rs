@@ -9,8 +9,8 @@ use crate::{
     input::{Background, EnvironmentInput, EnvironmentShape, FrameInput},
     passes::shape::LAST_CLASSES,
     pipeline::Pipelines,
-    plan::{Home, Made, Plan, Recipe},
-    prepare::{DevicePositions, Search},
+    plan::{Home, Made, Plan},
+    prepare::{self, DevicePositions, Search},
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder},
     resources::{Buffer, Image, Resource, Retired, Spec},
@@ -33,7 +33,7 @@ pub struct Renderer {
     limits: Limits,
     size: [u32; 2],
     output: vk::Format,
-    pipelines: Pipelines,
+    pub(crate) pipelines: Pipelines,
     /// Of the particles, and of the view.
     pub(crate) tables: [Table; 2],
     slots: Vec<Slot>,
@@ -180,41 +180,68 @@ impl Renderer {
         ledger
     }
 
-    /// Compiles what frames with these settings need, on all cores, so that recording them compiles nothing: whatever
-    /// their particles and their background, with and without a scene. Says how many pipelines that were.
+    /// Compiles, on all cores, whatever frames with these settings can need, so that recording them compiles nothing:
+    /// with particles of either class, of both or of none, prepared on the host or on the device, with and without a scene,
+    /// before either background, in either shape of environment. Says how many pipelines were made; those that were there
+    /// already count for nothing. To be called after [`Renderer::resize`], when there is time: at loading, say.
     ///
-    /// Frames differ in more than that: positions on the device (`positions`) and what the environment is (`shapes`).
+    /// That is dozens of pipelines; [`Renderer::warm_up_like`] makes those of one kind of frame. Without either, what a
+    /// frame needs is compiled when it is first recorded.
     pub fn warm_up(&mut self, settings: &Settings) -> Result<usize, Error> {
         settings.validate()?;
-        let mut plans = Vec::new();
-        for (has_scene, background) in [
-            (false, Background::Environment),
-            (true, Background::Environment),
-            (false, Background::Host),
-            (true, Background::Host),
-        ] {
-            for environment in [EnvironmentShape::Equirect, EnvironmentShape::Cube] {
-                for classes in [[0, 0], [1, 0], [0, 1], [1, 1]] {
-                    let mut scene = Scene::new(settings, [1, 1], classes, &self.limits);
-                    scene.output = self.output;
-                    (scene.has_scene, scene.background, scene.environment) = (has_scene, background, environment);
-                    plans.push(frame::plan(&scene)?);
+        let size = self.size.map(|s| s.max(1));
+        let scene = |classes| {
+            let mut scene = Scene::new(settings, size, classes, &self.limits);
+            scene.output = self.output;
+            scene
+        };
+        let mut scenes = Vec::new();
+        for classes in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            for has_scene in [false, true] {
+                for background in [Background::Environment, Background::Host] {
+                    for environment in [EnvironmentShape::Equirect, EnvironmentShape::Cube] {
+                        scenes.push(Scene { has_scene, background, environment, ..scene(classes) });
+                    }
                 }
             }
         }
         for search in [Search::Runs, Search::Relation] {
-            for keep_class_below in [None, Some(1.0)] {
-                let mut positions = DevicePositions::packed(vk::Buffer::null(), 1, 1.0);
-                positions.options.search = search;
-                positions.keep_class_below = keep_class_below;
-                let mut scene = Scene::new(settings, [1, 1], [0, 0], &self.limits);
-                scene.output = self.output;
+            for keep in [None, Some(1.0)] {
+                let options = prepare::Options { search, ..Default::default() };
+                let positions =
+                    DevicePositions::packed(vk::Buffer::null(), 1, 1.0).options(options).keep_class_below(keep);
+                let mut scene = scene([0, 0]);
                 self.fill(&mut scene, Amount::OnDevice(&positions))?;
-                plans.push(frame::plan(&scene)?);
+                scenes.push(scene);
             }
         }
-        let recipes: Vec<_> = plans.iter().flat_map(Plan::recipes).collect();
-        self.pipelines.make(&self.host, unique(recipes))
+        let plans: Vec<_> = scenes.iter().map(frame::plan).collect::<Result<_, _>>()?;
+        let recipes: HashSet<_> = plans.iter().flat_map(Plan::recipes).collect();
+        self.pipelines.make(&self.host, recipes)
+    }
+
+    /// Compiles what a frame like this one needs and is not there yet, of the particles last given or of its positions.
+    /// Of what it names (outputs, buffers, images) nothing is touched; null handles will do. Says how many pipelines were
+    /// made.
+    pub fn warm_up_like(&mut self, input: &FrameInput) -> Result<usize, Error> {
+        input.settings.validate()?;
+        let plan = frame::plan(&self.scene_of(input)?)?;
+        self.pipelines.make(&self.host, plan.recipes())
+    }
+
+    /// What a frame draws.
+    fn scene_of<'a>(&self, input: &FrameInput<'a>) -> Result<Scene<'a>, Error> {
+        let size = self.size.map(|s| s.max(1));
+        let mut scene = Scene::new(input.settings, size, [self.scene.splash, self.scene.body], &self.limits);
+        (scene.output, scene.background) = (self.output, input.background);
+        scene.environment = input.environment.map_or(EnvironmentShape::Equirect, |e| e.shape);
+        (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
+        if let Some(p) = &input.positions {
+            self.fill(&mut scene, Amount::OnDevice(p))?;
+        }
+        #[cfg(feature = "inspect")]
+        self.inspection.apply(&mut scene);
+        Ok(scene)
     }
 
     /// Puts particles into a scene.
@@ -290,11 +317,8 @@ impl Renderer {
         let mut bounds = self.scene.bounds;
         let mut space = self.scene.space;
         let mut positions = (vk::Buffer::null(), 0, 0);
-        let mut scene = Scene::new(input.settings, self.size, [self.scene.splash, self.scene.body], &self.limits);
-        (scene.output, scene.background, scene.environment) = (self.output, input.background, environment.shape);
-        (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
+        let mut scene = self.scene_of(input)?;
         if let Some(p) = &input.positions {
-            self.fill(&mut scene, Amount::OnDevice(p))?;
             // The device finds the box; what is written here never shows.
             (bounds, space) = ((Vec3::ZERO, Vec3::ZERO), Space::new(p.radius, Vec3::ZERO));
             if p.count > 0 {
@@ -302,8 +326,6 @@ impl Renderer {
                 positions = (p.buffer, p.offset - begin, begin + p.stride * u64::from(p.count - 1) + 12);
             }
         }
-        #[cfg(feature = "inspect")]
-        self.inspection.apply(&mut scene);
         let mut block = input.camera.uniforms(input.settings, self.size, &space, bounds);
         if let Some(p) = &input.positions {
             // In the preparation's units; the extent pass moves the origin and goes on to radii.
@@ -449,12 +471,6 @@ fn check_memory(host: &Host, limits: &Limits, tables: &[Table; 2], plan: &Plan) 
         None | Some(0) => Ok(()),
         Some(missing) => Err(Error::MemoryShort { needed, available: limits.memory, missing }),
     }
-}
-
-/// Each once.
-fn unique(recipes: Vec<&Recipe>) -> Vec<&Recipe> {
-    let mut seen = HashSet::new();
-    recipes.into_iter().filter(|r| seen.insert(*r)).collect()
 }
 
 /// In the order of the tables.

@@ -4,7 +4,7 @@
 
 use crate::{
     particles::{Ellipsoid, Particles},
-    shader::{EXTENT_ORIGIN, Particle},
+    shader::Particle,
 };
 use glam::{DMat3, DVec3, Mat4, Vec3, Vec4};
 
@@ -35,10 +35,11 @@ impl Space {
         Space::new(particles.radius, most.get(most.len() / 2).map_or(Vec3::ZERO, |e| e.center))
     }
 
+    #[cfg(feature = "inspect")]
     /// Of particles that the device prepared, from the words of the buffer "extent".
     pub fn prepared(radius: f32, extent: &[u32]) -> Space {
         let scale = f64::from(power_of_two(radius));
-        let at = |axis: u32| f64::from(f32::from_bits(extent[(EXTENT_ORIGIN + axis) as usize])) / scale;
+        let at = |axis: u32| f64::from(f32::from_bits(extent[(crate::shader::EXTENT_ORIGIN + axis) as usize])) / scale;
         Space { origin: DVec3::new(at(0), at(1), at(2)), radius: f64::from(radius) }
     }
 
@@ -48,6 +49,7 @@ impl Space {
     }
 
     /// A position of this space, in the world.
+    #[cfg(feature = "inspect")]
     pub fn world(&self, local: Vec3) -> Vec3 {
         (local.as_dvec3() * self.radius + self.origin).as_vec3()
     }

@@ -1,6 +1,6 @@
 //! The walk of each view ray through the liquid, and its colour (`glsl/refract.frag`; Imai16 §4.4, §4.5).
 
-use super::{Fresnel, Optics, tiles};
+use super::{Fresnel, tiles};
 use crate::{
     frame::Scene,
     input::{Background, EnvironmentShape},
@@ -11,7 +11,7 @@ use crate::{
 };
 use ash::vk::Format;
 
-/// What a walk is told: the members of [`Optics`] that follow rays are such.
+/// What a walk is told: the members of [`super::Optics`] that follow rays are such.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walk {
     /// Surfaces at which light bends: 1, 2 or 4.
@@ -24,7 +24,9 @@ pub struct Walk {
 
 impl Walk {
     /// The walk that optics stand for, if they are one.
-    pub fn of(optics: &Optics) -> Option<Walk> {
+    #[cfg(feature = "inspect")]
+    pub fn of(optics: &super::Optics) -> Option<Walk> {
+        use super::Optics;
         match *optics {
             Optics::Four(p) => Some(p.into()),
             Optics::Two(p) => Some(p.into()),

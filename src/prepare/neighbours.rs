@@ -134,8 +134,8 @@ impl Grid {
 
     /// Calls `f(i, neighbours)` for every particle, in parallel, and returns the answers in order.
     /// Neighbours are strictly nearer than `radius`, ascend, and include `i` itself. They are all of them where no run of
-    /// cells that differ in z alone holds more than [`CROWD`] particles (in the relation table, where no 27 cells hold more
-    /// than [`CROWD_RELATION`]): twenty-five times what liquid at rest has there.
+    /// cells that differ in z alone holds more than 1024 particles (in the relation table, where no 27 cells hold more
+    /// than 8192): twenty-five times what liquid at rest has there.
     pub fn map_neighbours<T: Send>(
         &self,
         radius: f64,

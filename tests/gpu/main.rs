@@ -12,6 +12,7 @@ mod goldens;
 mod host;
 mod normals;
 mod occlude;
+mod plan;
 mod plane_fit;
 mod refract;
 mod shape;

@@ -1,0 +1,134 @@
+//! What follows from a frame's plan: pipelines made ahead, pools as large as it takes, the ledger.
+
+use crate::{
+    background::{HostScene, painted},
+    host::{self, SIZE, case, with_renderer},
+    support::{Choose, each_driver, random_cloud},
+};
+use ash::vk;
+use glam::Vec3;
+use meniscus::{
+    Background, FrameInput, Particles, Renderer, Settings,
+    host::{Canvas, Gpu, Upload},
+    prepare::{DevicePositions, Options, Search},
+    renderer::Amount,
+    smooth::{Smooth, curvature_flow::CurvatureFlow, plane_fit::PlaneFit},
+};
+
+const FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+
+fn draw(gpu: &Gpu, renderer: &mut Renderer, canvas: &Canvas, input: &FrameInput) {
+    gpu.run(|cmd| {
+        canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+        // SAFETY: `cmd` is recording outside rendering; `run` waits, so slot 0 is free; the output is in its layout.
+        Ok(unsafe { renderer.record(cmd, input) }?)
+    })
+    .expect("frame");
+}
+
+fn cloud(splash: usize, body: usize) -> Particles {
+    random_cloud(3, 0.1, Vec3::splat(-0.5), Vec3::splat(0.5), splash, body)
+}
+
+/// After a warm-up no frame of these settings makes a pipeline, whatever it shows; without one, the first does.
+#[test]
+fn a_warmed_up_renderer_compiles_nothing() {
+    let positions: Vec<Vec3> = cloud(0, 300).ellipsoids.iter().map(|e| e.center).collect();
+    each_driver(|driver| {
+        with_renderer(driver, FORMAT, 1, |gpu, renderer| {
+            let canvas = Canvas::new(gpu, FORMAT, 16, SIZE).expect("canvas");
+            let case = case(cloud(5, 60));
+            let images = HostScene::new(gpu, &case.camera, SIZE, &painted(SIZE, |x, _| 1.0 + f64::from(x % 7)));
+            let upload = Upload::new(gpu, bytemuck::cast_slice(&positions)).expect("upload");
+            assert_eq!(renderer.pipelines(), 0);
+            renderer.set_particles(&case.particles).expect("particles");
+            let like = host::input(&case, 0, vk::ImageView::null());
+            let few = renderer.warm_up_like(&like).expect("compiled");
+            draw(gpu, renderer, &canvas, &host::input(&case, 0, canvas.view));
+            assert!(few > 5 && renderer.pipelines() == few, "{}: {few}, then {}", driver.name, renderer.pipelines());
+            let start = std::time::Instant::now();
+            let made = renderer.warm_up(&case.settings).expect("compiled");
+            println!("{}: {made} pipelines in {:.2} s", driver.name, start.elapsed().as_secs_f64());
+            assert_eq!(renderer.pipelines(), few + made);
+            assert_eq!(renderer.warm_up(&case.settings).expect("compiled"), 0, "{}: made twice", driver.name);
+            let input = host::input(&case, 0, canvas.view);
+            for (splash, body) in [(5, 60), (5, 0), (0, 60), (0, 0)] {
+                renderer.set_particles(&cloud(splash, body)).expect("particles");
+                for background in [Background::Environment, Background::Host] {
+                    for scene in [None, Some(images.input())] {
+                        draw(gpu, renderer, &canvas, &input.background(background).scene(scene));
+                    }
+                }
+            }
+            for search in [Search::Runs, Search::Relation] {
+                for keep in [None, Some(0.6)] {
+                    let options = Options { search, ..Options::default() };
+                    let given = DevicePositions::packed(upload.buffer, positions.len() as u32, 0.1);
+                    let given = given.options(options).keep_class_below(keep);
+                    draw(gpu, renderer, &canvas, &input.positions(given));
+                }
+            }
+            assert_eq!(renderer.pipelines(), few + made, "{}: a frame compiled something", driver.name);
+            // Other settings are other pipelines.
+            let other = case.settings.refractions(2).iterations(0);
+            draw(gpu, renderer, &canvas, &FrameInput::new(0, &case.camera, &other, canvas.view));
+            assert!(renderer.pipelines() > few + made, "{}: nothing was compiled", driver.name);
+        });
+    });
+}
+
+/// Hundreds of sets and steps in one frame, then few, then more again: pools and timestamps follow, and validation has
+/// nothing to say.
+#[test]
+fn pools_are_as_large_as_the_plan() {
+    let many = |iterations| {
+        Settings::from(meniscus::Method {
+            smooth: CurvatureFlow::default().iterations(iterations).into(),
+            ..Default::default()
+        })
+    };
+    each_driver(|driver| {
+        with_renderer(driver, FORMAT, 1, |gpu, renderer| {
+            let canvas = Canvas::new(gpu, FORMAT, 16, SIZE).expect("canvas");
+            let mut case = case(cloud(5, 60));
+            renderer.set_particles(&case.particles).expect("particles");
+            for settings in [many(300), Settings::default(), many(700), many(20)] {
+                case.settings = settings;
+                draw(gpu, renderer, &canvas, &host::input(&case, 0, canvas.view));
+                let times = renderer.times(0).expect("timestamps");
+                let smoothing =
+                    times.passes.iter().filter(|p| ["plane fit", "curvature flow"].contains(&p.name.as_str()));
+                // Steps of one pass are one scope.
+                assert_eq!(smoothing.count(), 1, "{}: {:?}", driver.name, times.passes);
+                assert!(times.passes.iter().all(|p| p.ms >= 0.0 && p.ms < 1e5), "{}: {times:?}", driver.name);
+            }
+        });
+    });
+}
+
+/// The ledger has what the chosen members make, and nothing else.
+#[test]
+fn memory_follows_from_the_method() {
+    each_driver(|driver| {
+        with_renderer(driver, FORMAT, 1, |_, renderer| {
+            let names = |smooth: Smooth, refractions| {
+                let mut settings = Settings::default().refractions(refractions);
+                settings.method.smooth = smooth;
+                let amount = Amount::Prepared { splash: 0, body: 60 };
+                let ledger = renderer.memory_requirements(SIZE, amount, &settings).expect("a valid size");
+                ledger.into_iter().map(|e| e.name).collect::<Vec<_>>()
+            };
+            let one = names(PlaneFit::default().iterations(1).into(), 4);
+            let two = names(PlaneFit::default().iterations(2).into(), 4);
+            let (odd, even) = ("body depth (smoothed, odd)", "body depth (smoothed, even)");
+            assert!(one.contains(&odd) && !one.contains(&even), "{one:?}");
+            assert!(two.contains(&odd) && two.contains(&even), "{two:?}");
+            assert!(
+                two.contains(&"front depth tiles")
+                    && !names(PlaneFit::default().into(), 2).contains(&"front depth tiles")
+            );
+            let binomial = names(Smooth::named("binomial").expect("a filter"), 4);
+            assert!(binomial.contains(&"missing silhouette") && !two.contains(&"missing silhouette"), "{binomial:?}");
+        });
+    });
+}
