@@ -1,4 +1,4 @@
-//! The house's own rules: a pass has its four files, no file grows past what can be read, licences are permissive.
+//! The house's own rules: a pass has its files, no file grows past what can be read, licences are permissive.
 
 use std::{fs, path::Path};
 
@@ -6,16 +6,13 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Passes without a shader of their own, and why.
-const NO_SHADER: &[&str] = &["reset"]; // fills and updates buffers: its effect is read back in every other pass's test
-
 #[test]
 fn a_pass_has_one_home() {
     let mut found = 0;
     for entry in fs::read_dir(root().join("src/passes")).expect("src/passes") {
         let path = entry.expect("readable").path();
         let stem = path.file_stem().expect("a file").to_string_lossy().into_owned();
-        if stem == "mod" || NO_SHADER.contains(&stem.as_str()) {
+        if stem == "mod" {
             continue;
         }
         found += 1;
@@ -26,6 +23,25 @@ fn a_pass_has_one_home() {
         }
     }
     assert!(found >= 6, "only {found} passes");
+}
+
+/// A filter is its shader, its Rust file and its twin; `tests/gpu/smooth.rs` compares them all.
+#[test]
+fn a_filter_has_one_home() {
+    let mut found = 0;
+    for entry in fs::read_dir(root().join("src/smooth")).expect("src/smooth") {
+        let path = entry.expect("readable").path();
+        let stem = path.file_stem().expect("a file").to_string_lossy().into_owned();
+        // What all share, and the one that does nothing.
+        if path.is_dir() || ["mod", "twin", "none"].contains(&stem.as_str()) {
+            continue;
+        }
+        found += 1;
+        for other in [format!("glsl/smooth/{stem}.comp"), format!("src/smooth/{stem}/twin.rs")] {
+            assert!(root().join(&other).exists(), "filter {stem} has no {other}");
+        }
+    }
+    assert!(found >= 7, "only {found} filters");
 }
 
 fn walk(folder: &Path, check: &mut dyn FnMut(&Path)) {
