@@ -12,11 +12,15 @@
 layout(local_size_x_id = 0, local_size_y_id = 1) in; // a square tile
 layout(constant_id = 2) const int HALF_WINDOW = 4; // window = 2 HALF_WINDOW + 1 pixels
 layout(constant_id = 3) const bool EUCLIDEAN = false; // weights of |p_i - p_j| instead of eq. (2)
-layout(push_constant) uniform PushBlock { float sigma; } push; // of eq. (2), in particle radii
+layout(constant_id = 5) const bool PROJECTED = false; // the window is as wide as a length at the pixel's depth
+layout(push_constant) uniform PushBlock {
+    float sigma; // of eq. (2), in particle radii
+    float width; // of a projected window, in particle radii
+} push;
 layout(set = 0, binding = 1) uniform texture2DArray depth_in;
 layout(set = 0, binding = 2) uniform utexture2DArray normal_raw;
 layout(set = 0, binding = 3, r32f) uniform writeonly image2DArray depth_out;
-layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters; // normals that cancel, grazing rays, updates too long
+layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters; // normals that cancel, grazing rays, updates too long, windows clipped
 layout(constant_id = 4) const uint COUNTERS = 0; // slot of its first counter
 
 const int TILE = int(gl_WorkGroupSize.x);
@@ -45,13 +49,22 @@ struct Sums {
     float total;  // of w
 };
 
+// Pixels to either side of a pixel that its window holds.
+int half_window(float own) {
+    if (!PROJECTED) return HALF_WINDOW;
+    float wanted = ceil(0.5 * push.width * abs(frame.pixel_scale.y) / own);
+    if (wanted > float(HALF_WINDOW)) atomicAdd(counters.at[COUNTERS + 3u], 1u);
+    return int(min(wanted, float(HALF_WINDOW)));
+}
+
 Sums sum_window(vec3 v, float own) {
+    int reach = half_window(own);
     vec2 step = 1.0 / frame.pixel_scale;
     float inverse = 1.0 / (push.sigma * push.sigma);
     ivec2 home = ivec2(gl_LocalInvocationID.xy) + HALF_WINDOW;
     Sums s = Sums(vec3(0.0), vec2(0.0), 0.0, 0.0);
-    for (int y = -HALF_WINDOW; y <= HALF_WINDOW; ++y) {
-        for (int x = -HALF_WINDOW; x <= HALF_WINDOW; ++x) {
+    for (int y = -reach; y <= reach; ++y) {
+        for (int x = -reach; x <= reach; ++x) {
             vec4 entry = tile[(home.y + y) * EDGE + home.x + x];
             if (entry.w <= 0.0) continue;
             float rise = entry.w - own;

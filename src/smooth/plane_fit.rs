@@ -28,10 +28,15 @@ parameters! {
     pub struct PlaneFit {
         /// Edge of the window
         window: u32 = 9, "pixels", "an odd number from 3 to 25" => |w| w % 2 == 1 && (3..=25).contains(w);
+        /// Whether the window is `width` wide at the pixel's depth, and `window` pixels at most: smoothing that does not
+        /// depend on zoom and resolution
+        projected: bool = false, "", "true or false" => |_| true;
+        /// Width of a projected window
+        width: f32 = 4.0, "particle radii", "a finite value of at least 0" => |w| w.is_finite() && *w >= 0.0;
         /// How often planes are fitted
         iterations: u32 = 2, "", "0 to 20" => |n| *n <= 20;
         /// Standard deviation of the weights, sigma of eq. (2)
-        sigma: f32 = 5.3, "particle radii", "a finite value above 0, in particle radii"
+        sigma: f32 = 5.3, "particle radii", "a finite value above 0"
             => |s| s.is_finite() && *s > 0.0;
         /// What weights are made of
         weighting: Weighting = Weighting::ViewDependent, "", "view-dependent (eq. 2) or euclidean" => |_| true;
@@ -58,12 +63,19 @@ impl Filter for PlaneFit {
                 .read("depth_in", from)
                 .read("normal_raw", normal)
                 .write("depth_out", to)
-                .counting(&["plane_fit_zero_normal_sum", "plane_fit_grazing", "plane_fit_update_too_long"])
+                .counting(&[
+                    "plane_fit_zero_normal_sum",
+                    "plane_fit_grazing",
+                    "plane_fit_update_too_long",
+                    "plane_fit_window_clipped",
+                ])
                 .constant("local_size_x", edge)
                 .constant("local_size_y", edge)
                 .constant("HALF_WINDOW", reach)
                 .constant("EUCLIDEAN", self.weighting == Weighting::Euclidean)
-                .push("sigma", self.sigma);
+                .constant("PROJECTED", self.projected)
+                .push("sigma", self.sigma)
+                .push("width", self.width);
             let groups = per_pixel(plan, edge, body.sides);
             plan.dispatch("plane fit", call, groups);
         })

@@ -14,6 +14,8 @@ const STEPS: [&str; 2] = ["body depth (smoothed, odd)", "body depth (smoothed, e
 /// Parameters beside the defaults: each kind of a filter is to be among them, and each kind of step the last or the only.
 const KINDS: &[(&str, &[(&str, &str)])] = &[
     ("plane-fit", &[("window", "7"), ("iterations", "1")]),
+    ("plane-fit", &[("projected", "true"), ("width", "1.7"), ("window", "25"), ("iterations", "1")]),
+    ("plane-fit", &[("projected", "true"), ("window", "7"), ("weighting", "euclidean")]),
     ("bilateral", &[("iterations", "1"), ("sigma_space", "0.8"), ("window", "9")]),
     ("bilateral", &[("iterations", "2"), ("projected", "false"), ("sigma_space", "2"), ("window", "49")]),
     ("bilateral-separable", &[("sigma_space", "0.6"), ("sigma_depth", "0.5")]),

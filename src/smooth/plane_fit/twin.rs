@@ -6,7 +6,7 @@
 use super::{PlaneFit, Weighting};
 use crate::{
     shader::{FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT, Frame},
-    smooth::twin::{Input, Pixel},
+    smooth::twin::{Input, Pixel, projected, reach},
     twin::normal::decode_normal,
 };
 use glam::{DVec2, DVec3};
@@ -46,6 +46,8 @@ pub struct Fit {
     pub outcome: Vec<Outcome>,
     /// The planes; `None` where there was nothing to fit.
     pub plane: Vec<Option<Plane>>,
+    /// The planes of windows a pixel larger or smaller, where 32 bits may round to those.
+    pub other: Vec<Option<Plane>>,
 }
 
 impl Fit {
@@ -61,7 +63,6 @@ pub const LEAST_AGREEMENT: f64 = 1e-6;
 /// Fits every pixel of one layer; `depth` and `normal` (packed, unsmoothed) row by row.
 pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], p: &PlaneFit) -> Fit {
     let (width, height) = (frame.size.x as i32, frame.size.y as i32);
-    let reach = p.window as i32 / 2;
     let sigma = f64::from(p.sigma);
     let index = |x: i32, y: i32| (y * width + x) as usize;
     let points: Vec<DVec3> = (0..height)
@@ -70,39 +71,49 @@ pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], p: &PlaneFit) -> 
         .collect();
     let normals: Vec<DVec3> = normal.iter().map(|n| decode_normal(*n).as_dvec3()).collect();
 
-    let mut fit =
-        Fit { depth: depth.to_vec(), outcome: vec![Outcome::Passed; depth.len()], plane: vec![None; depth.len()] };
+    let plane_of = |x: i32, y: i32, reach: i32| {
+        let mut normal_sum = DVec3::ZERO;
+        let mut point_sum = DVec3::ZERO;
+        let mut total = 0.0;
+        for ny in (y - reach).max(0)..=(y + reach).min(height - 1) {
+            for nx in (x - reach).max(0)..=(x + reach).min(width - 1) {
+                let j = index(nx, ny);
+                if depth[j] <= 0.0 {
+                    continue;
+                }
+                let apart = points[j] - points[index(x, y)];
+                let square = match p.weighting {
+                    Weighting::ViewDependent => apart.z * apart.z,
+                    Weighting::Euclidean => apart.length_squared(),
+                };
+                let w = (-square / (sigma * sigma)).exp(); // eq. (2)
+                normal_sum += w * normals[j];
+                point_sum += w * points[j];
+                total += w;
+            }
+        }
+        let n = normal_sum.normalize_or_zero(); // eq. (3)
+        let d = n.dot(point_sum / total); // eq. (4)
+        let v = view_ray(frame, x, y).normalize();
+        let z = d * v.z / n.dot(v); // eq. (5)
+        Plane { agreement: normal_sum.length() / total, facing: n.dot(v).abs(), depth: -z }
+    };
+
+    let mut fit = Fit {
+        depth: depth.to_vec(),
+        outcome: vec![Outcome::Passed; depth.len()],
+        plane: vec![None; depth.len()],
+        other: vec![None; depth.len()],
+    };
     for y in 0..height {
         for x in 0..width {
             let i = index(x, y);
             if depth[i] <= 0.0 {
                 continue;
             }
-            let mut normal_sum = DVec3::ZERO;
-            let mut point_sum = DVec3::ZERO;
-            let mut total = 0.0;
-            for ny in (y - reach).max(0)..=(y + reach).min(height - 1) {
-                for nx in (x - reach).max(0)..=(x + reach).min(width - 1) {
-                    let j = index(nx, ny);
-                    if depth[j] <= 0.0 {
-                        continue;
-                    }
-                    let apart = points[j] - points[i];
-                    let square = match p.weighting {
-                        Weighting::ViewDependent => apart.z * apart.z,
-                        Weighting::Euclidean => apart.length_squared(),
-                    };
-                    let w = (-square / (sigma * sigma)).exp(); // eq. (2)
-                    normal_sum += w * normals[j];
-                    point_sum += w * points[j];
-                    total += w;
-                }
-            }
-            let n = normal_sum.normalize_or_zero(); // eq. (3)
-            let d = n.dot(point_sum / total); // eq. (4)
-            let v = view_ray(frame, x, y).normalize();
-            let z = d * v.z / n.dot(v); // eq. (5)
-            let plane = Plane { agreement: normal_sum.length() / total, facing: n.dot(v).abs(), depth: -z };
+            let (own, other) = half_window(frame, p, depth[i]);
+            let plane = plane_of(x, y, own);
+            fit.other[i] = other.map(|reach| plane_of(x, y, reach));
             fit.outcome[i] = judge(frame, p, depth[i], &plane);
             fit.plane[i] = Some(plane);
             if fit.outcome[i] == Outcome::Fitted {
@@ -111,6 +122,15 @@ pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], p: &PlaneFit) -> 
         }
     }
     fit
+}
+
+/// Pixels to either side of a pixel that its window holds; and how many else, where rounding may decide.
+fn half_window(frame: &Frame, p: &PlaneFit, own: f32) -> (i32, Option<i32>) {
+    if p.projected {
+        reach(projected(frame, 0.5 * p.width, f64::from(own)), p.window / 2)
+    } else {
+        (p.window as i32 / 2, None)
+    }
 }
 
 /// Whether eq. (5) can be trusted; docs/methods.md says where it fails.
@@ -134,12 +154,12 @@ pub fn view_ray(frame: &Frame, x: i32, y: i32) -> DVec3 {
 }
 
 /// Error of eq. (5) in 32 bits. Storage rounds by half a step of the depth. The fraction is one of sums whose terms (up
-/// to the depth itself sideways; weights leave about sigma of rise) are rounded to a step or two of the largest; what
+/// to the depth itself sideways; weights leave about sigma of rise) are rounded to a step or two of the largest, weights to a few of their own; what
 /// it is divided by is n.v times the length of the sum of normals.
 pub fn rounding(p: &PlaneFit, own: f32, plane: &Plane) -> f64 {
     let [own, sigma] = [own, p.sigma].map(f64::from);
     let magnitude = own + (plane.depth - own).abs() + sigma;
-    f64::from(f32::EPSILON) * magnitude * (0.5 + 2.0 / (plane.facing * plane.agreement))
+    f64::from(f32::EPSILON) * magnitude * (0.5 + 3.0 / (plane.facing * plane.agreement))
 }
 
 /// Whether rounding decides if a guard fires.
@@ -168,11 +188,13 @@ pub(super) fn pixels(p: &PlaneFit, input: &Input) -> Vec<Pixel> {
         let own = input.depth[i];
         let Some(plane) = plane else { return Pixel::kept(own) };
         let on_plane = Pixel { depth: plane.depth, slack: rounding(p, own, plane), or: None };
-        match (is_close(p, input.frame, own, plane), fit.outcome[i]) {
+        let pixel = match (is_close(p, input.frame, own, plane), fit.outcome[i]) {
             (true, _) => Pixel { or: Some(f64::from(own)), ..on_plane },
             (false, Outcome::Fitted) => on_plane,
             _ => Pixel::kept(own),
-        }
+        };
+        let other = fit.other[i].map(|o| Pixel { depth: o.depth, slack: rounding(p, own, &o), or: None });
+        pixel.either(other)
     };
     fit.plane.iter().enumerate().map(pixel).collect()
 }
