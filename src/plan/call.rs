@@ -91,7 +91,7 @@ pub(crate) struct Call {
     /// By index in set 0, filled from `named` when the call is added to a plan.
     pub bound: Vec<(Binding, Target, Access)>,
     pub push: Vec<u8>,
-    named: Vec<(&'static str, Target, Way)>,
+    named: Vec<(&'static str, Target, Touch)>,
     /// What it counts.
     pub(super) counts: &'static [&'static str],
     /// Members of the push-constant block that were set; the whole block at once is "".
@@ -100,7 +100,7 @@ pub(crate) struct Call {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Way {
+enum Touch {
     Read,
     Write,
     Update,
@@ -134,19 +134,19 @@ impl Call {
 
     /// What the shaders call `name` is this resource, and is read.
     pub fn read(mut self, name: &'static str, target: Target) -> Call {
-        self.named.push((name, target, Way::Read));
+        self.named.push((name, target, Touch::Read));
         self
     }
 
     /// … and is written; of an image every texel is.
     pub fn write(mut self, name: &'static str, target: Target) -> Call {
-        self.named.push((name, target, Way::Write));
+        self.named.push((name, target, Touch::Write));
         self
     }
 
     /// … and is read and written.
     pub fn update(mut self, name: &'static str, target: Target) -> Call {
-        self.named.push((name, target, Way::Update));
+        self.named.push((name, target, Touch::Update));
         self
     }
 
@@ -213,7 +213,7 @@ impl Call {
             }
             self.bound.push((*b, plan.given(External::FrameBlock), Access::UniformRead));
         }
-        for (name, target, way) in std::mem::take(&mut self.named) {
+        for (name, target, touch) in std::mem::take(&mut self.named) {
             let Some(b) = bindings.iter().find(|b| b.name == name) else {
                 return Err(format!("no shader has a binding {name}"));
             };
@@ -221,7 +221,7 @@ impl Call {
                 return Err(format!("{name} is bound twice"));
             }
             fits(plan, b, target)?;
-            self.bound.push((*b, target, self.access(b, way)?));
+            self.bound.push((*b, target, self.access(b, touch)?));
         }
         let missing = |b: &&Binding| b.kind != Kind::Sampler && !self.bound.iter().any(|(o, ..)| o.index == b.index);
         if let Some(b) = bindings.iter().find(missing) {
@@ -236,26 +236,26 @@ impl Call {
     }
 
     /// How the shader that has a binding touches what is bound there.
-    fn access(&self, b: &Binding, way: Way) -> Result<Access, String> {
+    fn access(&self, b: &Binding, touch: Touch) -> Result<Access, String> {
         let (image, storage) = match b.kind {
             Kind::SampledImage(_) => (true, false),
             Kind::StorageImage(_) => (true, true),
             _ => (false, true),
         };
-        if image && (way == Way::Read) == storage {
+        if image && (touch == Touch::Read) == storage {
             return Err(format!("{} is {:?}: sampled images are read, storage images written", b.name, b.kind));
         }
         if let [vertex, _] = self.recipe.shaders.as_slice() {
-            return match (way, vertex.bindings.contains(b)) {
-                (Way::Read, true) => Ok(Access::VertexRead),
-                (Way::Read, false) => Ok(Access::FragmentRead),
+            return match (touch, vertex.bindings.contains(b)) {
+                (Touch::Read, true) => Ok(Access::VertexRead),
+                (Touch::Read, false) => Ok(Access::FragmentRead),
                 _ => Err(format!("{} is written while drawing", b.name)),
             };
         }
-        Ok(match way {
-            Way::Read => Access::ComputeRead,
-            Way::Write => Access::ComputeWrite,
-            Way::Update => Access::ComputeReadWrite,
+        Ok(match touch {
+            Touch::Read => Access::ComputeRead,
+            Touch::Write => Access::ComputeWrite,
+            Touch::Update => Access::ComputeReadWrite,
         })
     }
 }

@@ -5,6 +5,8 @@
 mod call;
 mod declare;
 mod step;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use call::{Blend, Call, Recipe};
 #[cfg(feature = "inspect")]

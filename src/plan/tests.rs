@@ -1,0 +1,196 @@
+//! What a plan refuses: mistakes of passes are found before anything is recorded.
+
+use super::{Call, Groups, Home, Plan, Rendering, Target, Vertices};
+use crate::{
+    resources::ImageSpec,
+    shader::{NORMALS_COMP, PLANE_FIT_COMP, TILES_COMP},
+};
+use ash::vk::{CompareOp, Format};
+
+struct Maps {
+    depth: Target,
+    normal: Target,
+    out: Target,
+}
+
+fn plan() -> (Plan, Maps) {
+    let mut plan = Plan::new([8, 6]);
+    plan.work_for(Home::View, "test");
+    let depth = plan.map("depth", Format::R32_SFLOAT, 2);
+    let normal = plan.map("normal", Format::R32_UINT, 2);
+    let out = plan.map("out", Format::R32_SFLOAT, 2);
+    (plan, Maps { depth, normal, out })
+}
+
+fn tiles(m: &Maps) -> Call {
+    Call::compute(&TILES_COMP).read("body_depth", m.depth).read("splash_depth", m.depth).write("front_tiles", m.out)
+}
+
+/// What is said of a dispatch.
+fn said(call: impl FnOnce(&mut Plan, &Maps) -> Call) -> String {
+    let (mut plan, maps) = plan();
+    let call = call(&mut plan, &maps);
+    plan.dispatch("pass", call, Groups::Direct([1, 1, 1]));
+    plan.finish().err().map_or_else(String::new, |e| e.to_string())
+}
+
+#[track_caller]
+fn refused(call: impl FnOnce(&mut Plan, &Maps) -> Call, why: &str) {
+    let said = said(call);
+    assert!(said.starts_with("pass pass: ") && said.contains(why), "\"{said}\" does not say \"{why}\"");
+}
+
+#[test]
+fn names_have_to_be_the_shaders() {
+    assert_eq!(said(|_, m| tiles(m)), "");
+    refused(|_, m| tiles(m).read("body_dept", m.depth), "no shader has a binding body_dept");
+    refused(|_, m| tiles(m).read("body_depth", m.depth), "body_depth is bound twice");
+    refused(
+        |_, m| Call::compute(&TILES_COMP).read("body_depth", m.depth).write("front_tiles", m.out),
+        "nothing is bound to splash_depth",
+    );
+    refused(|_, m| tiles(m).constant("HAS_FOAM", true), "no shader has a constant HAS_FOAM");
+    refused(|_, m| tiles(m).push("sigma", 1.0), "no shader has a push constant sigma");
+    refused(|_, m| tiles(m).push_all(&[1.0f32]), "4 bytes are pushed, the shaders have 0");
+    let fit = |m: &Maps| {
+        Call::compute(&PLANE_FIT_COMP).read("depth_in", m.depth).read("normal_raw", m.normal).write("depth_out", m.out)
+    };
+    refused(|_, m| fit(m).counting(&["a", "b", "c", "d"]).push("width", 1.0), "the push constant sigma is not set");
+    assert_eq!(said(|_, m| fit(m).counting(&["a", "b", "c", "d"]).push("width", 1.0).push("sigma", 1.0)), "");
+}
+
+#[test]
+fn kinds_have_to_be_the_shaders() {
+    // A map of normals holds integers.
+    refused(
+        |_, m| {
+            Call::compute(&TILES_COMP)
+                .read("body_depth", m.normal)
+                .read("splash_depth", m.depth)
+                .write("front_tiles", m.out)
+        },
+        "and normal is not",
+    );
+    // Two images for each other.
+    let swapped = |m: &Maps| Call::compute(&NORMALS_COMP[1]).read("depth_in", m.normal).read("normal_raw", m.depth);
+    refused(
+        |plan, m| swapped(m).write("normal_out", plan.map("n", Format::R32_UINT, 2)).counting(&["x"]),
+        "depth_in is",
+    );
+    refused(|plan, m| tiles(m).update("frame", plan.buffer("b", 4)), "frame");
+    let buffer = |plan: &mut Plan| plan.buffer("b", 4);
+    refused(
+        |plan, m| {
+            Call::compute(&TILES_COMP)
+                .read("body_depth", buffer(plan))
+                .read("splash_depth", m.depth)
+                .write("front_tiles", m.out)
+        },
+        "and b is not",
+    );
+    // Without layers, where the shader has an array.
+    refused(
+        |plan, m| {
+            Call::compute(&TILES_COMP)
+                .read("body_depth", plan.flat("flat", Format::R32_SFLOAT))
+                .read("splash_depth", m.depth)
+                .write("front_tiles", m.out)
+        },
+        "and flat is not",
+    );
+    refused(
+        |_, m| {
+            Call::compute(&TILES_COMP)
+                .write("body_depth", m.depth)
+                .read("splash_depth", m.depth)
+                .write("front_tiles", m.out)
+        },
+        "sampled images are read",
+    );
+}
+
+#[test]
+fn a_step_does_not_read_what_it_writes() {
+    refused(
+        |_, m| {
+            Call::compute(&TILES_COMP)
+                .read("body_depth", m.depth)
+                .read("splash_depth", m.depth)
+                .write("front_tiles", m.depth)
+        },
+        "depth is written in one step and used in it once more",
+    );
+}
+
+#[test]
+fn attachments_fit_together() {
+    let say = |draw: &dyn Fn(&mut Plan, &Maps) -> Rendering| {
+        let (mut plan, maps) = plan();
+        let rendering = draw(&mut plan, &maps);
+        // No draw at all: what is drawn into is looked at all the same.
+        plan.render("pass", rendering, Vec::<(Call, Vertices)>::new());
+        plan.finish().err().map_or_else(String::new, |e| e.to_string())
+    };
+    assert_eq!(say(&|_, m| Rendering::into(m.depth, 1).and(m.normal, 0)), "");
+    assert!(say(&|_, m| Rendering::into(m.depth, 2)).contains("depth is no attachment"));
+    assert!(say(&|p, _| Rendering::into(p.buffer("b", 4), 0)).contains("b is no attachment"));
+    let small = |p: &mut Plan| {
+        let spec =
+            ImageSpec { format: Format::R32_SFLOAT, size: [4, 3], layers: 1, array: false, usage: Default::default() };
+        p.image("small", spec)
+    };
+    assert_eq!(say(&|p, _| Rendering::into(small(p), 0)), "");
+    assert!(say(&|p, m| Rendering::into(small(p), 0).and(m.depth, 0)).contains("different sizes"));
+    let test = |p: &mut Plan| p.flat("test", Format::D32_SFLOAT);
+    assert!(
+        say(&|p, _| {
+            let (into, test) = (small(p), test(p));
+            Rendering::into(into, 0).testing(test, 0.0, CompareOp::GREATER)
+        })
+        .contains("different sizes")
+    );
+}
+
+#[test]
+fn no_two_resources_share_a_name() {
+    let (mut plan, _) = plan();
+    plan.map("depth", Format::R32_SFLOAT, 1);
+    let said = plan.finish().err().expect("refused").to_string();
+    assert!(said.contains("two resources have this name"), "{said}");
+}
+
+/// Every preset and every member with its defaults can be planned, with and without particles and a scene.
+#[test]
+fn every_method_has_a_plan() {
+    use crate::{Settings, device::Limits, frame, layers::Layers, optics::Optics, smooth::Smooth};
+    let limits = Limits {
+        point_size: 64.0,
+        image_size: 4096,
+        timestamp_period: None,
+        timestamp_mask: 0,
+        storage_size: 1 << 30,
+        memory: 1 << 32,
+    };
+    let (mut planned, mut refused) = (0, 0);
+    for layers in Layers::all() {
+        for smooth in Smooth::all() {
+            for optics in Optics::all() {
+                let settings = Settings::from(crate::Method { layers, smooth, optics });
+                if settings.validate().is_err() {
+                    refused += 1;
+                    continue;
+                }
+                for classes in [[0, 0], [3, 0], [0, 3], [2, 5]] {
+                    for has_scene in [false, true] {
+                        let scene =
+                            frame::Scene { has_scene, ..frame::Scene::new(&settings, [16, 9], classes, &limits) };
+                        let plan = frame::plan(&scene).unwrap_or_else(|e| panic!("{settings:?}: {e}"));
+                        assert!(!plan.steps.is_empty() && plan.descriptors().0 as usize >= plan.recipes().len());
+                        planned += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(planned > 300 && refused > 10, "{planned}, {refused}");
+}
