@@ -79,6 +79,8 @@ pub mod smooth;
 mod space;
 #[cfg(feature = "inspect")]
 pub mod space;
+#[cfg(any(feature = "io", feature = "inspect"))]
+mod srgb;
 mod table;
 #[cfg(feature = "inspect")]
 pub mod twin;

@@ -150,7 +150,7 @@ fn extension(path: &Path) -> Option<String> {
 pub fn encode_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<Vec<u8>, ImageError> {
     let (image, format) = match extension(path).as_deref() {
         Some("png") => {
-            let bytes = rgb.iter().flatten().map(|v| crate::twin::optics::srgb_byte(*v)).collect();
+            let bytes = rgb.iter().flatten().map(|v| crate::srgb::srgb_byte(*v)).collect();
             (image::RgbImage::from_raw(size[0], size[1], bytes).map(DynamicImage::from), ImageFormat::Png)
         }
         Some("exr") => {

@@ -1,8 +1,9 @@
 //! Twin of `glsl/include/optics.glsl`: light at one water surface, and sRGB.
 
+pub use crate::srgb::{decode_srgb, encode_srgb, srgb_byte};
 use glam::Vec3;
 
-/// Share of light reflected at a surface; `air` and `water` are the cosines on either side, `ior` is water against air.
+/// Reflectance of a surface; `air` and `water` are the cosines on either side, `ior` is water against air.
 pub fn fresnel(air: f32, water: f32, ior: f32, exact: bool) -> f32 {
     if exact {
         let s = (air - ior * water) / (air + ior * water);
@@ -24,20 +25,4 @@ pub fn refract(dir: Vec3, n: Vec3, eta: f32) -> Option<Vec3> {
 /// Mirror direction.
 pub fn reflect(dir: Vec3, n: Vec3) -> Vec3 {
     dir - 2.0 * dir.dot(n) * n
-}
-
-/// sRGB code of linear light, 0..1 (IEC 61966-2-1).
-pub fn encode_srgb(v: f32) -> f32 {
-    let v = v.clamp(0.0, 1.0);
-    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
-}
-
-/// Linear light of an sRGB code.
-pub fn decode_srgb(v: f32) -> f32 {
-    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-}
-
-/// sRGB in 8 bits, rounded to nearest.
-pub fn srgb_byte(v: f32) -> u8 {
-    (encode_srgb(v) * 255.0 + 0.5) as u8
 }

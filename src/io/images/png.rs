@@ -5,7 +5,7 @@ use std::io::{BufRead, Seek};
 use png::{ColorType, Decoder, Transformations};
 
 use super::map::{Fault, Frame, Target};
-use crate::twin::optics::decode_srgb;
+use crate::srgb::decode_srgb;
 
 /// First column and row, and the steps between, of Adam7's seven passes.
 const ADAM7: [[u32; 4]; 7] =
