@@ -5,7 +5,7 @@ use crate::{
     host::{self, SIZE, case, with_renderer},
     support::{Choose, each_driver, random_cloud},
 };
-use ash::vk;
+use ash::vk::{self, Handle};
 use glam::Vec3;
 use meniscus::{
     Background, FrameInput, Particles, Renderer, Settings,
@@ -13,6 +13,13 @@ use meniscus::{
     prepare::{DevicePositions, Options, Search},
     renderer::Amount,
     smooth::{Smooth, curvature_flow::CurvatureFlow, plane_fit::PlaneFit},
+};
+use std::{
+    ffi::c_void,
+    sync::{
+        Mutex,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 const FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
@@ -130,5 +137,74 @@ fn memory_follows_from_the_method() {
             let binomial = names(Smooth::named("binomial").expect("a filter"), 4);
             assert!(binomial.contains(&"missing silhouette") && !two.contains(&"missing silhouette"), "{binomial:?}");
         });
+    });
+}
+
+/// The device's own vkCreateComputePipelines and vkCreateGraphicsPipelines, and the last cache that each was given.
+static ORIGINAL: Mutex<[Option<unsafe extern "system" fn()>; 2]> = Mutex::new([None; 2]);
+static CACHES: [AtomicU64; 2] = [AtomicU64::new(0), AtomicU64::new(0)];
+
+macro_rules! noting {
+    ($name:ident, $which:literal, $Info:ty, $Function:ty) => {
+        unsafe extern "system" fn $name(
+            device: vk::Device,
+            cache: vk::PipelineCache,
+            count: u32,
+            infos: *const $Info,
+            callbacks: *const vk::AllocationCallbacks,
+            pipelines: *mut vk::Pipeline,
+        ) -> vk::Result {
+            CACHES[$which].store(cache.as_raw(), Ordering::Relaxed);
+            let original = ORIGINAL.lock().expect("not poisoned")[$which].expect("loaded");
+            // SAFETY: it was loaded under this function's name; the arguments are the caller's.
+            unsafe {
+                let original: $Function = std::mem::transmute(original);
+                original(device, cache, count, infos, callbacks, pipelines)
+            }
+        }
+    };
+}
+noting!(compute, 0, vk::ComputePipelineCreateInfo, vk::PFN_vkCreateComputePipelines);
+noting!(graphics, 1, vk::GraphicsPipelineCreateInfo, vk::PFN_vkCreateGraphicsPipelines);
+
+/// Pipelines are made with the host's cache. The CPU drivers keep nothing in theirs, so the calls are watched.
+#[test]
+fn the_hosts_pipeline_cache_is_used() {
+    each_driver(|driver| {
+        let gpu = driver.gpu();
+        // SAFETY: a complete info on a live device; destroyed below, after the renderer.
+        let cache = unsafe { gpu.device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) };
+        let cache = cache.expect("cache");
+        let mut host = gpu.host(1);
+        let load = |name: &std::ffi::CStr| {
+            // SAFETY: the device belongs to this instance.
+            let own = unsafe { host.instance.get_device_proc_addr(gpu.device.handle(), name.as_ptr()) };
+            let watched: Option<(usize, *const c_void)> = match name.to_bytes() {
+                b"vkCreateComputePipelines" => Some((0, compute as *const c_void)),
+                b"vkCreateGraphicsPipelines" => Some((1, graphics as *const c_void)),
+                _ => None,
+            };
+            if let Some((which, ours)) = watched {
+                ORIGINAL.lock().expect("not poisoned")[which] = own;
+                return ours;
+            }
+            own.map_or(std::ptr::null(), |f| f as *const c_void)
+        };
+        // SAFETY: the same device's functions, two of them watched.
+        let device = unsafe { meniscus::ash::Device::load_with(load, gpu.device.handle()) };
+        (host.device, host.pipeline_cache) = (device, cache);
+        // SAFETY: the device outlives the renderer and has the required features.
+        let mut renderer = unsafe { Renderer::new(host, FORMAT) }.expect("renderer");
+        let case = case(cloud(5, 60));
+        renderer.resize(SIZE).expect("size");
+        renderer.set_particles(&case.particles).expect("particles");
+        let made = renderer.warm_up_like(&host::input(&case, 0, vk::ImageView::null())).expect("compiled");
+        // SAFETY: nothing was recorded, so nothing is in flight.
+        unsafe {
+            renderer.destroy();
+            gpu.device.destroy_pipeline_cache(cache, None);
+        }
+        let given = CACHES.each_ref().map(|c| c.swap(0, Ordering::Relaxed));
+        assert!(made > 5 && given == [cache.as_raw(); 2], "{}: {made}, {given:?}", driver.name);
     });
 }
