@@ -48,7 +48,11 @@ impl<'a> Session<'a> {
         let input = FrameInput { output: self.canvas.view, ..*input };
         let (renderer, canvas) = (&mut self.renderer, &self.canvas);
         self.gpu.run(|cmd| {
-            canvas.transition(cmd, vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+            // A frame may keep what is there, which is then to be something.
+            let (undefined, clearing) = (vk::ImageLayout::UNDEFINED, vk::ImageLayout::GENERAL);
+            canvas.transition(cmd, undefined, clearing);
+            canvas.clear(cmd, clearing, [0.0; 4]);
+            canvas.transition(cmd, clearing, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
             // SAFETY: `cmd` is recording outside rendering; `run` waits, so slot 0 is free; the output was just
             // brought into the stated layout.
             Ok(unsafe { renderer.record(cmd, &input) }?)
