@@ -5,6 +5,7 @@ use crate::{
     background::{HostScene, Painted, linear_cube, linear_light, painted},
     cull::around_the_near_plane,
     drivers::SKY,
+    host::{self, with_renderer},
     splat,
     support::{Case, Driver, Shot, camera, each_driver, random_cloud, sphere},
 };
@@ -86,9 +87,13 @@ fn compare(what: &str, shot: &Shot, want: &[Seen], tolerance: f32) -> usize {
         far += usize::from(error > 4.0 * tolerance);
     }
     println!(
-        "{what}: {liquid} pixels of liquid, {most:.1e} off at most, {off} by more than {tolerance}, {doubt} in doubt"
+        "{what}: {liquid} pixels of liquid, {most:.1e} off at most, {off} by more than {tolerance}, {far} far, {doubt} in doubt"
     );
-    assert!(off * 100 <= liquid && doubt * 50 <= liquid, "{what}: {off} off, {doubt} in doubt");
+    // Around the sun the sky changes by thousands.
+    assert!(
+        off * 100 <= liquid && far * 2000 <= liquid && doubt * 50 <= liquid,
+        "{what}: {off}, {far} off, {doubt} in doubt"
+    );
     liquid
 }
 
@@ -144,12 +149,48 @@ fn look_ups_before_a_scene_are_the_twins() {
                     let what = format!("{}: {optics} {values:?}, {name}, {background:?}", driver.name);
                     let liquid = compare(&what, &shot, &want, 5e-3);
                     assert!(liquid > 3000, "{what}: {liquid}");
-                    // The host's picture stays where no liquid is seen: `picture` was cleared to nothing.
-                    let kept = want.iter().zip(&shot.picture).filter(|(want, _)| want.color.is_none());
-                    let touched = kept.filter(|(_, found)| **found != [0.0; 3]).count();
-                    assert_eq!(touched, 0, "{what}");
                 }
             }
+        }
+    });
+}
+
+/// With the host's background a pixel is written where liquid is seen, and nowhere else.
+#[test]
+fn the_hosts_picture_stays_beside_the_liquid() {
+    const BEFORE: [f32; 4] = [0.25, 0.5, 0.75, 0.125];
+    const FLOAT4: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+    let case = host::case(random_cloud(6, 0.1, Vec3::splat(-0.6), Vec3::splat(0.6), 20, 300));
+    // Strips: before all of the liquid, behind it, and nothing.
+    let scene = painted(host::SIZE, |x, _| [1.5, 6.0, f64::INFINITY][(x / 4 % 3) as usize]);
+    each_driver(|driver| {
+        for optics in ["ssfr", "instant-liquids"] {
+            let mut case = case.clone();
+            case.settings = settings(optics, &[]);
+            let images = HostScene::new(driver.gpu(), &case.camera, host::SIZE, &scene);
+            let shot = driver.shoot_before(&case, images.input(), Background::Host);
+            let depth: Vec<f64> = scene.0.iter().map(|d| d / shot.space.radius).collect();
+            let want = twin(&case, &shot, Some(told(&depth, &scene, Background::Host)), &|_| Vec3::ZERO);
+            with_renderer(driver, FLOAT4, 1, |gpu, renderer| {
+                let images = HostScene::new(gpu, &case.camera, host::SIZE, &scene);
+                renderer.set_particles(&case.particles).expect("particles");
+                let output = Canvas::new(gpu, FLOAT4, 16, host::SIZE).expect("canvas");
+                let before = BEFORE.repeat(want.len());
+                output
+                    .write(bytemuck::cast_slice(&before), vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+                    .expect("written");
+                let input = host::input(&case, 0, output.view).scene(images.input()).background(Background::Host);
+                // SAFETY: `cmd` is recording outside rendering; the output was just brought into the stated layout.
+                gpu.run(|cmd| Ok(unsafe { renderer.record(cmd, &input) }?)).expect("frame");
+                let floats: Vec<f32> = bytemuck::pod_collect_to_vec(&output.read().expect("picture"));
+                let mut covered = 0;
+                for (i, (pixel, want)) in floats.chunks_exact(4).zip(&want).enumerate() {
+                    assert_eq!(pixel == BEFORE, want.color.is_none(), "{}: {optics}: {i} is {pixel:?}", driver.name);
+                    assert!(want.color.is_none() || pixel[3] == 1.0, "{}: {optics}: {i} is {pixel:?}", driver.name);
+                    covered += usize::from(want.liquid);
+                }
+                assert!(covered > 500, "{}: {optics}: {covered}", driver.name);
+            });
         }
     });
 }
