@@ -13,7 +13,10 @@ use crate::{
 };
 pub use crate::{
     access::{Access, Barrier, State},
-    optics::walk::Walk,
+    optics::{
+        lookup::{Lookup, Mode, twin as lookup},
+        walk::Walk,
+    },
     resources::{ImageSpec, Spec},
 };
 use ash::vk;

@@ -38,10 +38,13 @@ const uint CORDS = 2u;      // the bent ray's lateral components are the offset
 // What lies behind the liquid at a position of the picture, as far as the picture reaches.
 vec3 seen_at(vec2 p) {
 #ifdef SCENE
-    ivec2 pixel = clamp(ivec2(floor(p)), ivec2(0), ivec2(frame.size) - 1);
+    // Clamped before it is a whole number: those end at 2^31.
+    ivec2 pixel = ivec2(clamp(floor(p), vec2(0.0), frame.size - 1.0));
     if (HOST_BACKGROUND || scene_linear(pixel) < CLEARED) return scene_light(pixel);
 #endif
-    return env_color(normalize(view_ray(p)));
+    // Far beside the picture the square of the ray's length is no number.
+    vec3 v = view_ray(p);
+    return env_color(normalize(v / max(max(abs(v.x), abs(v.y)), 1.0)));
 }
 
 // Moved by parts of the picture's edges, y up.

@@ -75,7 +75,11 @@ impl<'a> Session<'a> {
                 return Ok(None);
             }
             Some(Spec::Image(spec)) => {
-                let texel = if spec.format == FORMAT { 16 } else { 4 };
+                let texel = match spec.format {
+                    FORMAT => 16,
+                    vk::Format::R32G32_SFLOAT => 8,
+                    _ => 4,
+                };
                 u64::from(spec.size[0]) * u64::from(spec.size[1]) * texel
             }
             Some(Spec::Buffer { bytes, .. }) => bytes,

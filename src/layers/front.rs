@@ -1,6 +1,9 @@
 //! One surface, the nearest, and how much liquid lies behind it: what screen-space fluid rendering keeps (Cords08,
 //! Green10).
 
+#[cfg(feature = "inspect")]
+pub mod twin;
+
 use super::{
     Body, Layered, Layering,
     splat::{classes, particles, surface},

@@ -1,6 +1,9 @@
 //! The nearest and the farthest surface of all particles together (Imai14, as Imai16 §3 has it): dual depth peeling, which
 //! for two layers is one pass that keeps the largest of (-d, d).
 
+#[cfg(feature = "inspect")]
+pub mod twin;
+
 use super::{
     Body, Layered, Layering,
     splat::{classes, particles},

@@ -1,7 +1,10 @@
 //! One refraction as a look-up in the picture behind the liquid (`glsl/optics/lookup.frag`): what screen-space fluid
 //! rendering does in place of following rays.
 
-use super::Fresnel;
+#[cfg(feature = "inspect")]
+pub mod twin;
+
+use super::{Fresnel, Optics};
 use crate::{
     frame::Scene,
     input::{Background, EnvironmentShape},
@@ -40,6 +43,16 @@ pub struct Lookup {
 }
 
 impl Lookup {
+    /// The look-up that optics stand for, if they are one.
+    pub fn of(optics: &Optics) -> Option<Lookup> {
+        match *optics {
+            Optics::Ssfr(p) => Some(p.into()),
+            Optics::SsfrIndex(p) => Some(p.into()),
+            Optics::InstantLiquids(p) => Some(p.into()),
+            _ => None,
+        }
+    }
+
     /// Draws the picture; without liquid only what is behind it.
     pub(super) fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
         let body = surfaces.body.unwrap_or_else(|| super::walk::placeholder(plan));
@@ -56,7 +69,8 @@ impl Lookup {
             .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact)
             .constant("ENCODE_SRGB", scene.encode_srgb())
             .constant("HOST_BACKGROUND", scene.background == Background::Host)
-            .push("strength", self.strength)
+            // Positions of the picture that far off are still finite.
+            .push("strength", self.strength.min(1e30))
             .push("thickness_scale", self.thickness_scale)
             .push("light_x", light.x)
             .push("light_y", light.y)

@@ -71,7 +71,7 @@ pub fn splat(frame: &Frame, particles: &[Particle], visible: &[u32], side: u32) 
 
 /// Pixels to try: a pixel more than the tangent planes say, for silhouettes just missed; all of them for a particle
 /// that crosses the near plane, where no such planes exist.
-fn candidates(frame: &Frame, q: &Quadric) -> Option<[[u32; 2]; 2]> {
+pub(crate) fn candidates(frame: &Frame, q: &Quadric) -> Option<[[u32; 2]; 2]> {
     let (width, height, near) = viewport(frame);
     let [nearest, farthest] = q.reach();
     if farthest < near {

@@ -50,14 +50,14 @@ pub fn snell(w: DVec3, n: DVec3, eta: f64) -> Option<DVec3> {
 }
 
 /// A ray inside a quadric until it leaves it, or has been reflected more than `limit` times.
-struct Passage {
-    at: DVec3,
-    dir: DVec3,
-    length: f64,
+pub struct Passage {
+    pub at: DVec3,
+    pub dir: DVec3,
+    pub length: f64,
     reflections: u32,
-    limited: bool,
+    pub limited: bool,
     /// Smallest |sin i / sin critical - 1| on the way: near 0 a rounding error decides.
-    margin: f64,
+    pub margin: f64,
     /// Smallest |cosine| between surface and view at the walls: near 0 lies the silhouette, where the maps end.
     rim: f64,
 }
@@ -85,7 +85,7 @@ fn inside(q: &Quadric, eye: DVec3, mut at: DVec3, mut dir: DVec3, limit: u32) ->
 }
 
 /// Into a quadric from outside and out again; also the cosine at which the ray enters.
-fn through(q: &Quadric, o: DVec3, w: DVec3, limit: u32) -> Option<(Passage, f64)> {
+pub fn through(q: &Quadric, o: DVec3, w: DVec3, limit: u32) -> Option<(Passage, f64)> {
     let near = q.crossings(o, w)?.0;
     let at = o + near * w;
     let n = q.normal(at);

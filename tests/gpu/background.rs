@@ -20,6 +20,12 @@ const FLOAT4: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 const READ: vk::ImageLayout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
 const CLEARED: f32 = 1.0;
 
+/// What a depth buffer holds: z = (P22 z_e + P23) / -z_e at z_e = -d.
+pub fn z_at(camera: &Camera, d: f64) -> f32 {
+    let p = camera.projection;
+    if d.is_finite() { (p.w_axis.z - p.z_axis.z * d as f32) / d as f32 } else { CLEARED }
+}
+
 /// A scene as the host would have rendered it.
 pub struct HostScene<'a> {
     color: Canvas<'a>,
@@ -33,9 +39,7 @@ impl<'a> HostScene<'a> {
     pub fn new(gpu: &'a Gpu<'a>, camera: &Camera, size: [u32; 2], (depth, color): &Painted) -> HostScene<'a> {
         let canvas = |format, texel| Canvas::new(gpu, format, texel, size).expect("canvas");
         let scene = HostScene { color: canvas(FLOAT4, 16), depth: canvas(vk::Format::R32_SFLOAT, 4) };
-        let p = camera.projection;
-        // z = (P22 z_e + P23) / -z_e at z_e = -d
-        let z = |d: &f64| if d.is_finite() { (p.w_axis.z - p.z_axis.z * *d as f32) / *d as f32 } else { CLEARED };
+        let z = |d: &f64| z_at(camera, *d);
         let rgba: Vec<f32> = color.iter().flat_map(|c| [c.x, c.y, c.z, 1.0]).collect();
         let depths: Vec<f32> = depth.iter().map(z).collect();
         scene.color.write(bytemuck::cast_slice(&rgba), READ).expect("colour");
@@ -345,7 +349,7 @@ fn the_hosts_picture_stays_where_there_is_no_liquid() {
 }
 
 /// An environment whose colour is a linear function of the direction.
-fn linear_light(dir: Vec3) -> [f32; 3] {
+pub fn linear_light(dir: Vec3) -> [f32; 3] {
     (0.5 + 0.4 * dir).to_array()
 }
 
@@ -369,10 +373,8 @@ fn assert_linear(driver: &Driver, what: &str, picture: &[[f32; 4]], camera: &Cam
     assert!(worst <= most, "{}: {what}: {worst}", driver.name);
 }
 
-/// Seen in every direction, without liquid: the host's cube as Vulkan's table of faces lays it out, and its own
-/// equirectangular map.
-#[test]
-fn environments_may_be_the_hosts_own_images() {
+/// The same in a cube of so many texels along an edge.
+pub fn linear_cube(edge: u32) -> Vec<f32> {
     // Vulkan's table (cube map face selection): major axis, and directions in which s and t grow.
     let faces = [
         (Vec3::X, Vec3::NEG_Z, Vec3::NEG_Y),
@@ -382,13 +384,20 @@ fn environments_may_be_the_hosts_own_images() {
         (Vec3::Z, Vec3::X, Vec3::NEG_Y),
         (Vec3::NEG_Z, Vec3::NEG_X, Vec3::NEG_Y),
     ];
-    let edge = 64u32;
     let at = |i: u32| (i as f32 + 0.5) / edge as f32 * 2.0 - 1.0;
-    let texels: Vec<f32> = faces
+    faces
         .iter()
         .flat_map(|(major, s, t)| (0..edge * edge).map(move |i| *major + at(i % edge) * *s + at(i / edge) * *t))
         .flat_map(|dir| Vec3::from(linear_light(dir.normalize())).extend(1.0).to_array())
-        .collect();
+        .collect()
+}
+
+/// Seen in every direction, without liquid: the host's cube as Vulkan's table of faces lays it out, and its own
+/// equirectangular map.
+#[test]
+fn environments_may_be_the_hosts_own_images() {
+    let edge = 64u32;
+    let texels = linear_cube(edge);
     let map: Vec<f32> = (0..64u32 * 128)
         .flat_map(|i| {
             let polar = ((i / 128) as f32 + 0.5) / 64.0 * std::f32::consts::PI;

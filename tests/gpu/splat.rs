@@ -53,7 +53,7 @@ const SILHOUETTE: f64 = 2e-3;
 
 /// Depth errors in radii that 999 of 1000 pixels, and all away from silhouettes, keep.
 #[derive(Clone, Copy)]
-struct Tolerance {
+pub struct Tolerance {
     depth: f64,
     depth_most: f64,
     degrees: f64,
@@ -62,7 +62,7 @@ struct Tolerance {
 /// What float32 allows particles of `pixels` radius: 1e-4 pixels sideways on a slope of one, and a floor for the depth's
 /// own rounding (6e-8 of some 20 to 200 radii). Towards a silhouette the slope grows as the inverse root of the distance
 /// to it: to tenfold. Normals: those in 32 bits round to 0.004 degrees.
-fn tolerance(pixels: f64) -> Tolerance {
+pub fn tolerance(pixels: f64) -> Tolerance {
     let depth = 2e-5 + 1e-4 / pixels;
     Tolerance { depth, depth_most: 10.0 * depth, degrees: 0.05 }
 }
@@ -82,16 +82,17 @@ fn check(driver: &Driver, case: &Case, what: &str, tolerance: Tolerance) -> Shot
             let layer = twin::splat::splat(&shot.frame, &particles, &vec![3; particles.len()], side);
             let depth = shot.floats(depth_id, side).expect("drawn");
             let normal = shot.words(normal_id, side).expect("drawn");
-            check_layer(&layer, &depth, normal, &shot, tolerance, &label);
+            check_layer(&layer, &depth, Some(normal), &shot, tolerance, &label);
         }
     }
     shot
 }
 
-fn check_layer(
+/// Depths of a layer against the twin's, and normals, where it has any.
+pub fn check_layer(
     layer: &[twin::splat::Surface],
     depth: &[f32],
-    normal: &[u32],
+    normals: Option<&[u32]>,
     shot: &Shot,
     tolerance: Tolerance,
     label: &str,
@@ -99,7 +100,7 @@ fn check_layer(
     let near = f64::from(shot.frame.near);
     let (mut covered, mut outlines, mut far, mut tilted) = (0usize, 0usize, 0usize, 0usize);
     let (mut sum, mut most, mut turn) = (0.0f64, 0.0f64, 0.0f64);
-    for (pixel, ((want, got), normal)) in layer.iter().zip(depth).zip(normal).enumerate() {
+    for (pixel, (want, got)) in layer.iter().zip(depth).enumerate() {
         let got = f64::from(*got);
         let at = [pixel as u32 % shot.size[0], pixel as u32 / shot.size[0]];
         let sure = want.silhouette > SILHOUETTE;
@@ -124,9 +125,11 @@ fn check_layer(
         }
         let error = (got - want.depth).abs();
         far += usize::from(error > tolerance.depth);
-        let angle = decode_normal(*normal).as_dvec3().angle_between(want.normal).to_degrees();
         // Where the near plane lies inside a particle there is no surface, and no normal to compare.
-        let angle = if want.depth < 0.0 { 0.0 } else { angle };
+        let angle = match normals {
+            Some(n) if want.depth > 0.0 => decode_normal(n[pixel]).as_dvec3().angle_between(want.normal).to_degrees(),
+            _ => 0.0,
+        };
         tilted += usize::from(angle > tolerance.degrees);
         if sure {
             (sum, most) = (sum + error, most.max(error));

@@ -135,6 +135,12 @@ impl<'a> Driver<'a> {
         shot
     }
 
+    /// The same with another input.
+    pub fn shoot_with(&self, case: &Case, change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>) -> Shot {
+        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        self.shoot_input(case, 0, change)
+    }
+
     /// The device that frames are rendered on.
     pub fn gpu(&self) -> &'a Gpu<'a> {
         self.session.borrow().gpu
