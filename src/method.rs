@@ -30,14 +30,21 @@ pub(crate) struct Offers {
     pub normals: bool,
     /// How much liquid there is along each view ray, all particles' shares added.
     pub thickness: bool,
+    /// Surfaces at half the picture's width and height. Not together with the thickness, which is measured up to the host's
+    /// scene, pixel by pixel of the picture.
+    pub half: bool,
 }
 
 impl Offers {
-    const WORDS: [&'static str; 3] =
-        ["the far side of the liquid", "the particles' own normals", "the liquid's thickness"];
+    const WORDS: [&'static str; 4] = [
+        "the far side of the liquid",
+        "the particles' own normals",
+        "the liquid's thickness",
+        "surfaces at half the picture's resolution",
+    ];
 
-    fn all(self) -> [bool; 3] {
-        [self.backs, self.normals, self.thickness]
+    fn all(self) -> [bool; 4] {
+        [self.backs, self.normals, self.thickness, self.half]
     }
 }
 

@@ -9,7 +9,7 @@ use crate::{
     plan::{Call, External, Groups, Home, Made, Plan, Rendering, Step, Target, Vertices, Work},
     profile::Profiler,
     resources::Resource,
-    shader::{Binding, Kind},
+    shader::{self, Binding, Kind},
     table::Table,
 };
 use ash::vk;
@@ -151,7 +151,8 @@ impl Recorder<'_> {
             let name = declared.name;
             let mut note = |barrier| self.barriers.push(PlanEntry { pass, resource: name, barrier });
             match declared.made {
-                Made::Given(External::FrameBlock) => {
+                // One state for the blocks of all scales: they lie in one buffer.
+                Made::Given(External::FrameBlock(_)) => {
                     if let Some(barrier) = self.frame_block.step(*access, false) {
                         note(barrier);
                         buffers.push(barrier.on_buffer(self.externals.frame_block));
@@ -250,7 +251,8 @@ impl Recorder<'_> {
             let clear = vk::ClearValue { color: vk::ClearColorValue { float32 } };
             colors.push(attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, load, clear));
         }
-        let [width, height] = rendering.colors.first().map_or(self.plan.size, |c| self.plan.attachment_size(c.target));
+        let [width, height] =
+            rendering.colors.first().map_or(self.plan.picture, |c| self.plan.attachment_size(c.target));
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
         let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&colors);
         let depth_info;
@@ -283,7 +285,9 @@ impl Recorder<'_> {
         let [centers, diagonals, mixed] = self.externals.particles;
         let all = |buffer| Ok((buffer, 0, vk::WHOLE_SIZE));
         match self.plan.resource(target).made {
-            Made::Given(External::FrameBlock) => all(self.externals.frame_block),
+            Made::Given(External::FrameBlock(scale)) => {
+                Ok((self.externals.frame_block, scale.offset(), size_of::<shader::Frame>() as u64))
+            }
             Made::Given(External::Positions) => Ok(self.externals.positions),
             Made::Given(External::Centers) => all(centers),
             Made::Given(External::Diagonals) => all(diagonals),

@@ -14,6 +14,7 @@ use crate::{
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder},
     resources::{Buffer, Image, Resource, Retired, Spec},
+    scale::Scale,
     slot::Slot,
     space::{self, Space},
     table::{self, LedgerEntry, Table},
@@ -368,7 +369,11 @@ impl Renderer {
             scene: input.scene,
             output: input.output,
         };
-        slot.frame_block.mapped()[..size_of_val(&block)].copy_from_slice(bytemuck::bytes_of(&block));
+        for scale in Scale::ALL {
+            let at = scale.offset() as usize;
+            let scaled = scale.block(&block);
+            slot.frame_block.mapped()[at..at + size_of_val(&scaled)].copy_from_slice(bytemuck::bytes_of(&scaled));
+        }
         if let Some(p) = &mut slot.profiler {
             p.begin_frame(&self.host.device, cmd);
         }

@@ -23,7 +23,7 @@ parameters! {
 
 impl Layering for Front {
     fn offers(&self) -> Offers {
-        Offers { backs: false, normals: true, thickness: true }
+        Offers { backs: false, normals: true, thickness: true, half: true }
     }
 
     fn may_cull(&self, scene: &Scene) -> bool {

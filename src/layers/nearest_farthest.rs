@@ -22,7 +22,7 @@ parameters! {
 
 impl Layering for NearestFarthest {
     fn offers(&self) -> Offers {
-        Offers { backs: true, normals: false, thickness: false }
+        Offers { backs: true, ..Offers::default() }
     }
 
     fn may_cull(&self, _: &Scene) -> bool {
@@ -38,7 +38,7 @@ impl Layering for NearestFarthest {
         let sides = scene.sides();
         let depth = plan.map("body depth (ray-cast)", Format::R32_SFLOAT, sides);
         let call = Call::compute(&EXTREMES_COMP).read("peeled", peeled).write("depth_out", depth);
-        let [width, height] = plan.size.map(|s| s.div_ceil(IMAGE_GROUP));
+        let [width, height] = plan.size().map(|s| s.div_ceil(IMAGE_GROUP));
         plan.dispatch("sides", call, Groups::Direct([width, height, sides]));
         Layered { splash: None, body: Some(Body { depth, normal: None, sides }), thickness: None }
     }

@@ -24,7 +24,7 @@ pub(super) const BODY: Names =
 
 impl Layering for Split {
     fn offers(&self) -> Offers {
-        Offers { backs: true, normals: true, thickness: false }
+        Offers { backs: true, normals: true, ..Offers::default() }
     }
 
     fn may_cull(&self, _: &Scene) -> bool {

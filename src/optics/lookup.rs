@@ -37,6 +37,8 @@ pub struct Lookup {
     pub light: Vec3,
     /// Fraction of white that is scattered, that is mirrored, and the exponent of that (Phong).
     pub phong: [f32; 3],
+    /// Whether the surfaces are of half the picture's width and height, and upsampled.
+    pub half_resolution: bool,
 }
 
 impl Lookup {
@@ -56,6 +58,7 @@ impl Lookup {
             .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact)
             .constant("ENCODE_SRGB", scene.encode_srgb())
             .constant("HOST_BACKGROUND", scene.background == Background::Host)
+            .constant("HALF_RESOLUTION", self.half_resolution)
             .push("strength", self.strength)
             .push("thickness_scale", self.thickness_scale)
             .push("light_x", light.x)

@@ -39,6 +39,7 @@ impl From<Ssfr> for Lookup {
             fresnel: p.fresnel,
             light: Vec3::ZERO,
             phong: [0.0; 3],
+            half_resolution: false,
         }
     }
 }

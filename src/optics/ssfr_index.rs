@@ -38,6 +38,7 @@ impl From<SsfrIndex> for Lookup {
             fresnel: p.fresnel,
             light: Vec3::ZERO,
             phong: [0.0; 3],
+            half_resolution: false,
         }
     }
 }

@@ -9,6 +9,7 @@ mod cull;
 mod drivers;
 mod extent;
 mod goldens;
+mod half;
 mod host;
 mod normals;
 mod occlude;
