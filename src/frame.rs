@@ -45,7 +45,7 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
         let layered = method.layers.member().record(&mut plan, scene, &drawn);
         plan.work_for(Home::View, "smooth");
         surfaces.body = layered.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
-        (surfaces.splash, surfaces.thickness) = (layered.splash, layered.thickness);
+        (surfaces.splash, surfaces.thickness, surfaces.speed) = (layered.splash, layered.thickness, layered.speed);
         plan.work_at(Scale::Full);
     }
     #[cfg(feature = "inspect")]

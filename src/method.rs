@@ -33,18 +33,21 @@ pub(crate) struct Offers {
     /// Surfaces at half the picture's width and height. Not together with the thickness, which is measured up to the host's
     /// scene, pixel by pixel of the picture.
     pub half: bool,
+    /// How fast the particles in front are.
+    pub speeds: bool,
 }
 
 impl Offers {
-    const WORDS: [&'static str; 4] = [
+    const WORDS: [&'static str; 5] = [
         "the far side of the liquid",
         "the particles' own normals",
         "the liquid's thickness",
         "surfaces at half the picture's resolution",
+        "the particles' speeds",
     ];
 
-    fn all(self) -> [bool; 4] {
-        [self.backs, self.normals, self.thickness, self.half]
+    fn all(self) -> [bool; 5] {
+        [self.backs, self.normals, self.thickness, self.half, self.speeds]
     }
 }
 

@@ -22,6 +22,8 @@ pub(crate) struct Externals {
     pub positions: (vk::Buffer, u64, u64),
     /// Centres and shapes, where the host prepared them.
     pub particles: [vk::Buffer; 3],
+    /// How fast they are, where the host said so.
+    pub speeds: vk::Buffer,
     pub environment: (vk::ImageView, vk::ImageLayout),
     pub scene: Option<SceneInput>,
     pub output: vk::ImageView,
@@ -292,6 +294,7 @@ impl Recorder<'_> {
             Made::Given(External::Centers) => all(centers),
             Made::Given(External::Diagonals) => all(diagonals),
             Made::Given(External::Mixed) => all(mixed),
+            Made::Given(External::Speeds) => all(self.externals.speeds),
             _ => match self.own(target)? {
                 Resource::Buffer(b) => all(b.handle),
                 Resource::Image(_) => Err(absent("recording", self.plan.resource(target).name)),

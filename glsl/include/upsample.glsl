@@ -4,6 +4,7 @@ struct Front {
     float depth;    // 0: no surface; negative: the near plane lies inside a particle
     vec3 normal;
     float coverage; // share of the four that have a surface, by their weights
+    float speed;    // of the same pixels as the depth; 0 without a velocity map
 };
 
 Front upsampled(vec2 position) {
@@ -28,17 +29,20 @@ Front upsampled(vec2 position) {
         }
     }
     vec3 normal = decode_normal(own_normal);
-    if (own <= 0.0) return Front(own, normal, coverage);
+    if (own <= 0.0) return Front(own, normal, coverage, 0.0);
     // No surface is made up between two: what a steep one changes from pixel to pixel of the maps, and no more.
     float jump = max(JUMP, 2.0 * STEEP * own / max(abs(frame.pixel_scale.x), abs(frame.pixel_scale.y)));
-    float total = 0.0, rise = 0.0;
+    float total = 0.0, rise = 0.0, fast = 0.0;
     vec3 sum = vec3(0.0);
     for (int k = 0; k < 4; ++k) {
         if (depth[k] <= 0.0 || abs(depth[k] - own) > jump) continue;
         total += weight[k];
         rise += weight[k] * (depth[k] - own);
+#ifdef SPEED
+        fast += weight[k] * texelFetch(speed, at[k], 0).x;
+#endif
         sum += weight[k] * decode_normal(texelFetch(body_normal, ivec3(at[k], SIDE_FRONT), 0).x);
     }
     float size = length(sum);
-    return Front(own + rise / total, size > 0.0 ? sum / size : normal, coverage);
+    return Front(own + rise / total, size > 0.0 ? sum / size : normal, coverage, fast / total);
 }

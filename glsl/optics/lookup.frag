@@ -1,7 +1,7 @@
 // One refraction as a look-up in the picture of what lies behind, moved sideways by what the surface is like: screen-space
 // fluid rendering (Green10; Im16 figs. 4 and 5) and Instant Liquids (Cords08). Nothing is traced.
 #version 460
-// Compiled with any of: SCENE, CUBE, THICKNESS
+// Compiled with any of: SCENE, CUBE, THICKNESS, SPEED
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
@@ -18,6 +18,9 @@ layout(set = 0, binding = 2) uniform utexture2DArray body_normal;
 #ifdef THICKNESS
 layout(set = 0, binding = 3) uniform texture2D thickness; // in particle radii
 #endif
+#ifdef SPEED
+layout(set = 0, binding = 4) uniform texture2D speed; // of the particle in front, in world units a second
+#endif
 layout(push_constant) uniform PushBlock {
     float strength;          // of the offset
     float thickness_scale;   // of T = 1 - exp(-scale thickness), over the particle radius
@@ -27,6 +30,8 @@ layout(push_constant) uniform PushBlock {
     float diffuse;           // fraction of white that is scattered
     float specular;          // of the light's mirror image
     float shininess;         // its exponent
+    float spray;             // share of white at the speed after it, and above
+    float spray_speed;
 } push;
 layout(location = 0) out vec4 out_color;
 #include "environment.glsl"
@@ -97,6 +102,11 @@ void main() {
             color += push.diffuse * max(facing, 0.0);
             if (facing > 0.0 && mirror > 0.0) color += push.specular * exp(push.shininess * log(mirror));
         }
+#ifdef SPEED
+        // Spray: shifted to white by the velocity map (Cords08 section 4).
+        float fast = HALF_RESOLUTION ? front.speed : texelFetch(speed, pixel, 0).x;
+        color = mix(color, vec3(1.0), push.spray * min(fast / push.spray_speed, 1.0));
+#endif
     }
     // The liquid's edge runs between the maps' pixels.
     if (HALF_RESOLUTION && !HOST_BACKGROUND && front.coverage < 1.0) color = mix(behind(pixel, dir), color, front.coverage);

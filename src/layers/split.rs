@@ -36,6 +36,6 @@ impl Layering for Split {
         let mut surface = |class, names| splat::surface(plan, scene, drawn, &[class], sides, names);
         let splash = scene.splash.then(|| surface(CLASS_SPLASH, &SPLASH));
         let body = scene.body.then(|| surface(CLASS_BODY, &BODY));
-        Layered { splash, body: body.map(Body::from), thickness: None }
+        Layered { splash, body: body.map(Body::from), thickness: None, speed: None }
     }
 }

@@ -40,6 +40,7 @@ impl From<Ssfr> for Lookup {
             light: Vec3::ZERO,
             phong: [0.0; 3],
             half_resolution: false,
+            spray: [0.0, 1.0],
         }
     }
 }

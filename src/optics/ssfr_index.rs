@@ -39,6 +39,7 @@ impl From<SsfrIndex> for Lookup {
             light: Vec3::ZERO,
             phong: [0.0; 3],
             half_resolution: false,
+            spray: [0.0, 1.0],
         }
     }
 }

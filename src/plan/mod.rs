@@ -40,6 +40,7 @@ pub(crate) enum External {
     Centers,
     Diagonals,
     Mixed,
+    Speeds,
     Environment,
     SceneColor,
     SceneDepth,

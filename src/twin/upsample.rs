@@ -13,11 +13,13 @@ pub struct Upsampled {
     pub normal: DVec3,
     /// Share of the four pixels around that have a surface, by their bilinear weights.
     pub coverage: f64,
+    /// Of the same pixels as the depth; 0 without a velocity map.
+    pub speed: f64,
 }
 
 /// `half` is the block of the maps' own view, `depth` and `normal` are its maps, row by row; `position` is one of the picture's,
-/// twice as large.
-pub fn upsample(half: &Frame, depth: &[f32], normal: &[u32], position: DVec2) -> Upsampled {
+/// twice as large. `speed` is the velocity map, or empty.
+pub fn upsample(half: &Frame, depth: &[f32], normal: &[u32], speed: &[f32], position: DVec2) -> Upsampled {
     let (width, height) = (half.size.x as i32, half.size.y as i32);
     let q = 0.5 * position - 0.5;
     let (column, row) = (q.x.floor(), q.y.floor());
@@ -27,22 +29,24 @@ pub fn upsample(half: &Frame, depth: &[f32], normal: &[u32], position: DVec2) ->
         let at = (y * width + x) as usize;
         let weight = (1.0 - (q.x - column - dx).abs()) * (1.0 - (q.y - row - dy).abs());
         if depth[at] != 0.0 {
-            found.push((weight, f64::from(depth[at]), decode_normal(normal[at]).as_dvec3()));
+            let speed = speed.get(at).map_or(0.0, |s| f64::from(*s));
+            found.push((weight, f64::from(depth[at]), decode_normal(normal[at]).as_dvec3(), speed));
         }
     }
     let coverage = found.iter().map(|f| f.0).sum();
     // The first of equals.
     let Some(own) = found.iter().copied().reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
-        return Upsampled { depth: 0.0, normal: DVec3::ZERO, coverage: 0.0 };
+        return Upsampled { depth: 0.0, normal: DVec3::ZERO, coverage: 0.0, speed: 0.0 };
     };
     if own.1 < 0.0 {
-        return Upsampled { depth: own.1, normal: own.2, coverage };
+        return Upsampled { depth: own.1, normal: own.2, coverage, speed: 0.0 };
     }
     let pixel = own.1 / f64::from(half.pixel_scale.abs().max_element());
     let jump = f64::from(JUMP).max(f64::from(STEEP) * pixel);
     found.retain(|f| f.1 > 0.0 && (f.1 - own.1).abs() <= jump);
     let total: f64 = found.iter().map(|f| f.0).sum();
     let depth = found.iter().map(|f| f.0 * f.1).sum::<f64>() / total;
+    let speed = found.iter().map(|f| f.0 * f.3).sum::<f64>() / total;
     let sum: DVec3 = found.iter().map(|f| f.0 * f.2).sum();
-    Upsampled { depth, normal: sum.try_normalize().unwrap_or(own.2), coverage }
+    Upsampled { depth, normal: sum.try_normalize().unwrap_or(own.2), coverage, speed }
 }

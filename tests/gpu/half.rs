@@ -14,32 +14,32 @@ use meniscus::{
     smooth::Smooth,
     twin::{
         background::env_color,
-        optics::{fresnel, reflect, refract},
+        optics::{fresnel, reflect, refract, spray},
         upsample::{Upsampled, upsample},
     },
 };
 
 /// Cords08's method with these optics.
-fn settings(optics: InstantLiquids, smooth: Option<Smooth>) -> Settings {
+pub fn settings(optics: InstantLiquids, smooth: Option<Smooth>) -> Settings {
     let mut method = Method::preset("cords08").expect("a preset");
     method.optics = optics.into();
     method.smooth = smooth.unwrap_or(method.smooth);
     Settings::from(method)
 }
 
-fn case(particles: Particles, size: [u32; 2], settings: Settings) -> Case {
+pub fn case(particles: Particles, size: [u32; 2], settings: Settings) -> Case {
     Case { particles, camera: camera(Vec3::new(0.4, 0.9, 2.2), Vec3::ZERO, size), settings, size, eye_inside: false }
 }
 
 /// Two blocks, the nearer before the other, and a cloud: slopes, jumps and silhouettes.
-fn liquid() -> Particles {
+pub fn liquid() -> Particles {
     let mut particles = random_cloud(4, 0.1, Vec3::new(-0.9, -0.6, -0.9), Vec3::new(0.9, 0.1, 0.3), 0, 600);
     particles.ellipsoids.extend(lattice(Vec3::new(0.3, 0.2, 0.9), 0.08, [4, 5, 2]));
     particles
 }
 
 /// What the frame's own maps hold: depths and normals of the nearest front, as light meets it.
-fn maps(driver: &Driver, shot: &Shot) -> (Vec<f32>, Vec<u32>) {
+pub fn maps(driver: &Driver, shot: &Shot) -> (Vec<f32>, Vec<u32>) {
     let names = driver.session.borrow().renderer.surfaces();
     let depth = shot.floats(names.body_depth.expect("a body"), 0).expect("depths");
     (depth, shot.words(names.body_normal.expect("a body"), 0).expect("normals").to_vec())
@@ -98,7 +98,7 @@ fn particles_prepared_on_the_device_are_drawn_at_half_resolution() {
 }
 
 /// The colour of a pixel whose surface is given, before the environment alone.
-fn shade(shot: &Shot, optics: &InstantLiquids, light: Vec3, pixel: DVec2, surface: &Upsampled) -> Vec3 {
+pub fn shade(shot: &Shot, optics: &InstantLiquids, light: Vec3, pixel: DVec2, surface: &Upsampled) -> Vec3 {
     let f = &shot.frame;
     let to_env = Mat3::from_mat4(f.eye_to_env).as_dmat3();
     let ray = |p: DVec2| ((p - f.pixel_origin.as_dvec2()) / f.pixel_scale.as_dvec2()).extend(-1.0).normalize();
@@ -121,6 +121,7 @@ fn shade(shot: &Shot, optics: &InstantLiquids, light: Vec3, pixel: DVec2, surfac
     if facing > 0.0 && mirror > 0.0 {
         color += optics.specular * mirror.powf(optics.shininess);
     }
+    color = spray(color, surface.speed as f32, optics.spray, optics.spray_speed);
     behind.lerp(color, surface.coverage as f32)
 }
 
@@ -138,7 +139,7 @@ fn the_picture_is_the_twins() {
             let (mut off, mut edges, mut covered) = (0, 0, 0);
             for (i, found) in shot.picture.iter().enumerate() {
                 let pixel = DVec2::new((i as u32 % size[0]) as f64 + 0.5, (i as u32 / size[0]) as f64 + 0.5);
-                let surface = upsample(&half, &depth, &normal, pixel);
+                let surface = upsample(&half, &depth, &normal, &[], pixel);
                 let want = shade(&shot, &optics, light, pixel, &surface);
                 // Drivers compute arc tangents of the sky's directions to 2e-4 or so: 4e-3 of its clouds.
                 let error = (Vec3::from(*found) - want).abs() / (1.0 + want);
@@ -168,7 +169,7 @@ fn before_a_scene_and_over_the_hosts_picture() {
             let (mut hidden, mut shown) = (0, 0);
             for (i, found) in shot.picture.iter().enumerate() {
                 let (x, y) = (i as u32 % size[0], i as u32 / size[0]);
-                let surface = upsample(&half, &depth, &normal, DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+                let surface = upsample(&half, &depth, &normal, &[], DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
                 let own = painted.1[i].to_array();
                 if x < 37 {
                     hidden += usize::from(surface.coverage > 0.0);

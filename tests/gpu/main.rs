@@ -21,5 +21,6 @@ mod smooth;
 mod sort;
 mod space;
 mod splat;
+mod spray;
 mod support;
 mod tiles;
