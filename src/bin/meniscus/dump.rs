@@ -28,16 +28,15 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
         for (side, layer) in [("front", SIDE_FRONT), ("back", SIDE_BACK)] {
             let mut words = |name: Option<&'static str>| name.map_or(Ok(None), |name| session.words(name, layer));
             let (Some(depths), normals) = (words(depth)?, words(normal)?) else { continue };
-            // Maps of optics that upsample are smaller than the picture.
-            let size = match depth.and_then(|name| session.renderer.spec(name)) {
-                Some(Spec::Image(spec)) => spec.size,
-                _ => job.size,
-            };
+            let size = depth.map_or(job.size, |name| size_of_map(session, name));
             out.maps(&format!("{class}_{side}"), raw, size, &depths, normals.as_deref())?;
         }
     }
     if let Some(words) = session.words("thickness", 0)? {
         out.array("thickness", 1, words.into_iter().map(|w| f32::from_bits(w) * out.radius))?;
+    }
+    if let Some(words) = session.words("speed", 0)? {
+        out.array_of("speed", size_of_map(session, "speed"), 1, words.into_iter().map(f32::from_bits))?;
     }
     // Not all optics walk.
     if let Some(words) = session.words("walk (debug)", 0)? {
@@ -57,6 +56,14 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     }
     out.dump.write("frame.json", serde_json::to_string_pretty(&frame(job))?.as_bytes())?;
     Ok(out.dump.finish()?)
+}
+
+/// Maps of optics that upsample are smaller than the picture.
+fn size_of_map(session: &Session, name: &str) -> [u32; 2] {
+    match session.renderer.spec(name) {
+        Some(Spec::Image(spec)) => spec.size,
+        _ => [0, 0],
+    }
 }
 
 fn floats(words: Vec<u32>) -> Vec<f32> {
