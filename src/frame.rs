@@ -9,6 +9,7 @@ use crate::{
     method::Offers,
     passes::{Arrays, compact, cull, extent, occlude, shape, sort},
     plan::{Home, Plan},
+    scale::Scale,
     shader, smooth,
 };
 use ash::vk;
@@ -33,6 +34,8 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
         };
 
         plan.work_for(Home::View, "visibility");
+        // Optics that upsample have the surfaces at half the picture's width and height (Cords08 §5).
+        plan.work_at(scene.scale());
         // Which particles can show at all.
         let bounds = scene.occlusion().then(|| occlude::record(&mut plan, scene, &particles));
         let culled = cull::record(&mut plan, scene, &particles, bounds);
@@ -42,7 +45,8 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
         let layered = method.layers.member().record(&mut plan, scene, &drawn);
         plan.work_for(Home::View, "smooth");
         surfaces.body = layered.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
-        (surfaces.splash, surfaces.thickness) = (layered.splash, layered.thickness);
+        (surfaces.splash, surfaces.thickness, surfaces.speed) = (layered.splash, layered.thickness, layered.speed);
+        plan.work_at(Scale::Full);
     }
     #[cfg(feature = "inspect")]
     {
@@ -121,6 +125,11 @@ impl<'a> Scene<'a> {
         self.settings.method.optics.member().asks()
     }
 
+    /// At what scale of the picture surfaces are drawn and smoothed.
+    pub fn scale(&self) -> Scale {
+        if self.asks().half { Scale::Half } else { Scale::Full }
+    }
+
     /// Sides of each class that are drawn: front only, or front and back.
     pub fn sides(&self) -> u32 {
         if self.asks().backs { 2 } else { 1 }
@@ -129,7 +138,7 @@ impl<'a> Scene<'a> {
     /// Whether hidden particles are dropped before drawing. That only saves time: where its bounds do not fit a storage
     /// buffer, everything is drawn.
     pub fn occlusion(&self) -> bool {
-        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        let pixels: u64 = self.scale().size(self.size).map(u64::from).iter().product();
         let wanted = self.settings.drawing.occlusion_culling && self.settings.method.layers.member().may_cull(self);
         self.body && wanted && 8 * pixels <= self.storage_size
     }

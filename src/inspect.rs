@@ -8,6 +8,7 @@ use crate::{
     plan::{COUNTERS, Plan},
     recorder::PlanEntry,
     resources::Resource,
+    scale::Scale,
     shader::Frame,
     space::Space,
 };
@@ -70,6 +71,11 @@ impl SurfaceNames {
 /// The block that shaders read; see [`Camera`].
 pub fn uniforms(camera: &Camera, settings: &Settings, size: [u32; 2], space: &Space, bounds: (Vec3, Vec3)) -> Frame {
     camera.uniforms(settings, size, space, bounds)
+}
+
+/// The block of passes that work at half the picture's width and height, of that of the picture.
+pub fn half(picture: &Frame) -> Frame {
+    Scale::Half.block(picture)
 }
 
 impl Renderer {

@@ -68,6 +68,7 @@ pub mod profile;
 mod recorder;
 pub mod renderer;
 mod resources;
+mod scale;
 pub mod settings;
 #[cfg(not(feature = "inspect"))]
 mod shader;

@@ -30,14 +30,24 @@ pub(crate) struct Offers {
     pub normals: bool,
     /// How much liquid there is along each view ray, all particles' shares added.
     pub thickness: bool,
+    /// Surfaces at half the picture's width and height. Not together with the thickness, which is measured up to the host's
+    /// scene, pixel by pixel of the picture.
+    pub half: bool,
+    /// How fast the particles in front are.
+    pub speeds: bool,
 }
 
 impl Offers {
-    const WORDS: [&'static str; 3] =
-        ["the far side of the liquid", "the particles' own normals", "the liquid's thickness"];
+    const WORDS: [&'static str; 5] = [
+        "the far side of the liquid",
+        "the particles' own normals",
+        "the liquid's thickness",
+        "surfaces at half the picture's resolution",
+        "the particles' speeds",
+    ];
 
-    fn all(self) -> [bool; 3] {
-        [self.backs, self.normals, self.thickness]
+    fn all(self) -> [bool; 5] {
+        [self.backs, self.normals, self.thickness, self.half, self.speeds]
     }
 }
 

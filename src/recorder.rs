@@ -9,7 +9,7 @@ use crate::{
     plan::{Call, External, Groups, Home, Made, Plan, Rendering, Step, Target, Vertices, Work},
     profile::Profiler,
     resources::Resource,
-    shader::{Binding, Kind},
+    shader::{self, Binding, Kind},
     table::Table,
 };
 use ash::vk;
@@ -22,6 +22,8 @@ pub(crate) struct Externals {
     pub positions: (vk::Buffer, u64, u64),
     /// Centres and shapes, where the host prepared them.
     pub particles: [vk::Buffer; 3],
+    /// How fast they are, where the host said so.
+    pub speeds: vk::Buffer,
     pub environment: (vk::ImageView, vk::ImageLayout),
     pub scene: Option<SceneInput>,
     pub output: vk::ImageView,
@@ -151,7 +153,8 @@ impl Recorder<'_> {
             let name = declared.name;
             let mut note = |barrier| self.barriers.push(PlanEntry { pass, resource: name, barrier });
             match declared.made {
-                Made::Given(External::FrameBlock) => {
+                // One state for the blocks of all scales: they lie in one buffer.
+                Made::Given(External::FrameBlock(_)) => {
                     if let Some(barrier) = self.frame_block.step(*access, false) {
                         note(barrier);
                         buffers.push(barrier.on_buffer(self.externals.frame_block));
@@ -250,7 +253,8 @@ impl Recorder<'_> {
             let clear = vk::ClearValue { color: vk::ClearColorValue { float32 } };
             colors.push(attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, load, clear));
         }
-        let [width, height] = rendering.colors.first().map_or(self.plan.size, |c| self.plan.attachment_size(c.target));
+        let [width, height] =
+            rendering.colors.first().map_or(self.plan.picture, |c| self.plan.attachment_size(c.target));
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
         let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&colors);
         let depth_info;
@@ -283,11 +287,14 @@ impl Recorder<'_> {
         let [centers, diagonals, mixed] = self.externals.particles;
         let all = |buffer| Ok((buffer, 0, vk::WHOLE_SIZE));
         match self.plan.resource(target).made {
-            Made::Given(External::FrameBlock) => all(self.externals.frame_block),
+            Made::Given(External::FrameBlock(scale)) => {
+                Ok((self.externals.frame_block, scale.offset(), size_of::<shader::Frame>() as u64))
+            }
             Made::Given(External::Positions) => Ok(self.externals.positions),
             Made::Given(External::Centers) => all(centers),
             Made::Given(External::Diagonals) => all(diagonals),
             Made::Given(External::Mixed) => all(mixed),
+            Made::Given(External::Speeds) => all(self.externals.speeds),
             _ => match self.own(target)? {
                 Resource::Buffer(b) => all(b.handle),
                 Resource::Image(_) => Err(absent("recording", self.plan.resource(target).name)),

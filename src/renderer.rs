@@ -14,6 +14,7 @@ use crate::{
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder},
     resources::{Buffer, Image, Resource, Retired, Spec},
+    scale::Scale,
     slot::Slot,
     space::{self, Space},
     table::{self, LedgerEntry, Table},
@@ -21,7 +22,7 @@ use crate::{
 use ash::vk;
 use glam::Vec3;
 use std::collections::HashSet;
-use uploads::PARTICLE_ARRAYS;
+use uploads::{PARTICLE_ARRAYS, SPEEDS};
 
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
 ///
@@ -41,6 +42,8 @@ pub struct Renderer {
     frame: u64,
     /// Centres, and the two halves of the shapes.
     particles: Option<[Buffer; 3]>,
+    /// How fast they are.
+    speeds: Option<Buffer>,
     scene: SceneBounds,
     environment: Option<Image>,
     pub(crate) barriers: Vec<PlanEntry>,
@@ -110,6 +113,7 @@ impl Renderer {
             retired: Retired::default(),
             frame: 0,
             particles: None,
+            speeds: None,
             scene: SceneBounds {
                 space: Space::new(1.0, Vec3::ZERO),
                 splash: 0,
@@ -156,7 +160,7 @@ impl Renderer {
     }
 
     /// Device memory that frames of a size take, resource by resource, before anything is allocated. Particles that the
-    /// host prepared are extra, 36 bytes each, and a static environment map, 16 bytes a texel.
+    /// host prepared are extra, 36 bytes each and 4 more with their speeds, and a static environment map, 16 bytes a texel.
     pub fn memory_requirements(
         &self,
         size: [u32; 2],
@@ -176,6 +180,7 @@ impl Renderer {
         let entry = |name, bytes, per_particle| LedgerEntry { name, bytes, per_particle };
         let particles = PARTICLE_ARRAYS.into_iter().zip(self.particles.iter().flatten());
         ledger.extend(particles.map(|(name, b)| entry(name, b.bytes, true)));
+        ledger.extend(self.speeds.iter().map(|b| entry(SPEEDS, b.bytes, true)));
         ledger.extend(self.environment.iter().map(|i| entry("environment", i.bytes, false)));
         ledger
     }
@@ -326,6 +331,7 @@ impl Renderer {
                 positions = (p.buffer, p.offset - begin, begin + p.stride * u64::from(p.count - 1) + 12);
             }
         }
+        self.check_speeds(&scene)?;
         let mut block = input.camera.uniforms(input.settings, self.size, &space, bounds);
         if let Some(p) = &input.positions {
             // In the preparation's units; the extent pass moves the origin and goes on to radii.
@@ -386,11 +392,16 @@ impl Renderer {
             frame_block: slot.frame_block.handle,
             positions,
             particles: particles.map_or([vk::Buffer::null(); 3], |b| b.each_ref().map(|b| b.handle)),
+            speeds: self.speeds.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
             environment: (environment.view, environment.layout),
             scene: input.scene,
             output: input.output,
         };
-        slot.frame_block.mapped()[..size_of_val(&block)].copy_from_slice(bytemuck::bytes_of(&block));
+        for scale in Scale::ALL {
+            let at = scale.offset() as usize;
+            let scaled = scale.block(&block);
+            slot.frame_block.mapped()[at..at + size_of_val(&scaled)].copy_from_slice(bytemuck::bytes_of(&scaled));
+        }
         if let Some(p) = &mut slot.profiler {
             p.begin_frame(&self.host.device, cmd);
         }
@@ -452,7 +463,7 @@ impl Renderer {
             table.retire_all(&mut self.retired, 0);
         }
         self.retired.collect(&self.host, u64::MAX);
-        self.particles.take().into_iter().flatten().for_each(|mut b| b.destroy(&self.host));
+        self.particles.take().into_iter().flatten().chain(self.speeds.take()).for_each(|mut b| b.destroy(&self.host));
         if let Some(mut i) = self.environment.take() {
             i.destroy(&self.host);
         }

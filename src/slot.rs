@@ -1,6 +1,6 @@
 //! What belongs to one of the frames in flight.
 
-use crate::{Error, device::Host, plan::Plan, profile::Profiler, resources::Buffer, shader};
+use crate::{Error, device::Host, plan::Plan, profile::Profiler, resources::Buffer, scale};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
@@ -10,6 +10,7 @@ pub(crate) struct Slot {
     pub pool: vk::DescriptorPool,
     /// Sets, and descriptors of each type, that the pool holds.
     room: (u32, Vec<(vk::DescriptorType, u32)>),
+    /// The frame's block for each scale.
     pub frame_block: Buffer,
     /// Number of the frame last recorded into this slot; 0: none yet.
     pub frame: u64,
@@ -19,8 +20,7 @@ impl Slot {
     pub fn new(host: &Host) -> Result<Slot, Error> {
         // The extent pass completes it where positions are prepared on the device.
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
-        let bytes = size_of::<shader::Frame>() as u64;
-        let frame_block = Buffer::new(host, "frame block", bytes, usage, MemoryLocation::CpuToGpu)?;
+        let frame_block = Buffer::new(host, "frame block", scale::BLOCKS, usage, MemoryLocation::CpuToGpu)?;
         let pool = vk::DescriptorPool::null();
         Ok(Slot { profiler: Profiler::new(host), pool, room: (0, Vec::new()), frame_block, frame: 0 })
     }

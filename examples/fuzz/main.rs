@@ -155,6 +155,7 @@ fn check(name: &Path, content: &[u8]) -> Result<String, String> {
             check_finite(&mut file, Invalid::Drop, name).map_err(|error| error.to_string())?;
             let n = file.positions.len();
             let lengths = file.classes.as_ref().is_none_or(|c| c.len() == n && c.iter().all(|c| *c < 2))
+                && file.velocities.as_ref().is_none_or(|v| v.len() == n && v.iter().all(|v| v.is_finite()))
                 && file.axes.as_ref().is_none_or(|a| a.len() == n);
             let radii = [file.radius, file.support].into_iter().flatten().all(|r| r.is_finite() && r > 0.0);
             match lengths && radii && file.positions.iter().all(|p| p.is_finite()) {

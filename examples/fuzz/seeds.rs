@@ -51,6 +51,7 @@ pub fn of(format: &str) -> Vec<Seed> {
             format!("\u{feff}\"Points:0\",\"Points:1\",\"Points:2\"\r\n{}", rows(",")).into(),
             b"# note\nclass,z,id,Y,x,radius\n1,2,9,-1.25,0.5,0.25\n0,-0.125,8,4.5,3,0.25\n".to_vec(),
             format!("x\ty\tz\n{}", rows("\t")).into(),
+            b"x,y,z,vx,vy,vz\n0,1,2,0.5,-1,nan\n3,4,5,0,2,0\n".to_vec(),
         ],
         "ply" => ply(),
         "vtk" => vtk(),
@@ -58,6 +59,7 @@ pub fn of(format: &str) -> Vec<Seed> {
         "bgeo" => vec![
             bgeo(&[], 0),
             bgeo(b"\0\x05class\0\x01\0\0\0\x01\0\0\0\0", 1),
+            bgeo(b"\0\x01v\0\x03\0\0\0\x05\0\0\0\0\0\0\0\0\0\0\0\0", 3),
             bgeo(b"\0\x01v\0\x02\0\0\0\x00\0\0\0\0\0\0\0\0", 2),
         ],
         "npy" => npy(),
@@ -79,6 +81,7 @@ pub fn of(format: &str) -> Vec<Seed> {
             |array| pack::npz(&[("pos", &npy()[0]), ("class", array)], Deflated),
             |array| pack::npz(&[("pos", &npy()[0]), ("radius", array)], Stored),
             |array| pack::npz(&[("center", &npy()[0]), ("axes", array)], Deflated),
+            |array| pack::npz(&[("center", &npy()[0]), ("velocity", array)], Stored),
         ],
         "png" => &[
             |rows| pack::png(b"\0\0\0\x04\0\0\0\x02\x08\x02\0\0\0", rows),
@@ -118,9 +121,11 @@ fn ply() -> Vec<Vec<u8>> {
             "ply\nformat {format} 1.0\ncomment test\nelement vertex 3\n{axes}property uchar class\n{rest}end_header\n"
         )
     };
+    let velocity = ["vx", "vy", "vz"].map(|axis| format!("property float {axis}\n")).concat();
     let faces = "element face 1\nproperty list uchar int vertex_indices\n";
     let records = |data: Vec<u8>| data.chunks(12).flat_map(|xyz| [xyz, &[1]].concat()).collect::<Vec<u8>>();
     vec![
+        (head("ascii", "double", &velocity) + &rows(" ").replace('\n', " 1 0.5 -1 2\n")).into_bytes(),
         (head("ascii", "double", faces) + &rows(" ").replace('\n', " 1\n") + "3 0 1 2\n").into_bytes(),
         [head("binary_little_endian", "float", "").into_bytes(), records(packed(f32::to_le_bytes))].concat(),
         [
@@ -149,7 +154,8 @@ fn vtk() -> Vec<Vec<u8>> {
     ];
     let ascii = format!(
         "# vtk DataFile Version 5.1\nt\nASCII\nDATASET POLYDATA\nPOINTS 3 double\n{}\nVERTICES 4 3\nOFFSETS vtktypeint64\n0 1 2 3\n\
-         CONNECTIVITY vtktypeint64\n0 1 2\nPOINT_DATA 3\nSCALARS class int\nLOOKUP_TABLE default\n1 0 1\n",
+         CONNECTIVITY vtktypeint64\n0 1 2\nPOINT_DATA 3\nSCALARS class int\nLOOKUP_TABLE default\n1 0 1\nVECTORS v float\n{}",
+        rows(" "),
         rows(" ")
     );
     vec![binary.concat(), ascii.into_bytes()]
@@ -160,7 +166,8 @@ fn vtu() -> Vec<Vec<u8>> {
         let head = format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\" {attributes}><UnstructuredGrid>\
              <Piece NumberOfPoints=\"3\" NumberOfCells=\"0\"><PointData><DataArray type=\"UInt8\" Name=\"class\" format=\"ascii\">\
-             0 1 1</DataArray></PointData><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" {array}</DataArray></Points>\
+             0 1 1</DataArray><DataArray type=\"Float32\" Name=\"velocity\" NumberOfComponents=\"3\" format=\"ascii\">1 2 3 4 5
+             6 7 8 9</DataArray></PointData><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" {array}</DataArray></Points>\
              </Piece></UnstructuredGrid>"
         );
         [head.as_bytes(), data, b"\n</VTKFile>\n"].concat()

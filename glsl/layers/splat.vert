@@ -1,17 +1,23 @@
 // Particles as point sprites, or as quads where points are too small (QUADS). Both hand the same numbers to
 // splat.frag, which ray-casts the quadric; the primitive only has to cover it.
 #version 460
-// Compiled with any of: QUADS
+// Compiled with any of: QUADS, SPEED
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "frame.glsl"
 #include "quadric.glsl"
 #include "particles.glsl"
 layout(set = 0, binding = 4, std430) readonly buffer DrawnBlock { uint at[]; } drawn;
+#ifdef SPEED
+layout(set = 0, binding = 5, std430) readonly buffer SpeedBlock { float at[]; } speeds; // of the particles
+#endif
 layout(push_constant) uniform PushBlock { Splat splat; };
 layout(location = 0) flat out vec3 center; // eye space, z as depth
 layout(location = 1) flat out vec3 g_diagonal; // G = S^-1 in eye space: xx, yy, zz
 layout(location = 2) flat out vec3 g_mixed;    // xy, xz, yz
+#ifdef SPEED
+layout(location = 3) flat out float speed;
+#endif
 
 void main() {
 #ifdef QUADS
@@ -24,7 +30,11 @@ void main() {
     uint count = frame.count;
     Particle p;
     int cls;
-    particle(drawn.at[splat.side * count + (splat.cls == CLASS_SPLASH ? rank : count - 1u - rank)], p, cls);
+    uint i = drawn.at[splat.side * count + (splat.cls == CLASS_SPLASH ? rank : count - 1u - rank)];
+    particle(i, p, cls);
+#ifdef SPEED
+    speed = speeds.at[i];
+#endif
     Ellipsoid e = to_eye(p);
     vec4 box = pixel_bounds(e);
 

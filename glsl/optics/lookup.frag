@@ -1,7 +1,7 @@
 // One refraction as a look-up in the picture of what lies behind, moved sideways by what the surface is like: screen-space
 // fluid rendering (Green10; Im16 figs. 4 and 5) and Instant Liquids (Cords08). Nothing is traced.
 #version 460
-// Compiled with any of: SCENE, CUBE, THICKNESS
+// Compiled with any of: SCENE, CUBE, THICKNESS, SPEED
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
@@ -12,10 +12,14 @@ layout(constant_id = 0) const uint MODE = 0; // one of LOOKUP_…
 layout(constant_id = 1) const bool EXACT_FRESNEL = false;
 layout(constant_id = 2) const bool ENCODE_SRGB = false;
 layout(constant_id = 3) const bool HOST_BACKGROUND = false; // only liquid is drawn, over what is there
+layout(constant_id = 4) const bool HALF_RESOLUTION = false; // of the maps
 layout(set = 0, binding = 1) uniform texture2DArray body_depth;
 layout(set = 0, binding = 2) uniform utexture2DArray body_normal;
 #ifdef THICKNESS
 layout(set = 0, binding = 3) uniform texture2D thickness; // in particle radii
+#endif
+#ifdef SPEED
+layout(set = 0, binding = 4) uniform texture2D speed; // of the particle in front, in world units a second
 #endif
 layout(push_constant) uniform PushBlock {
     float strength;          // of the offset
@@ -26,10 +30,13 @@ layout(push_constant) uniform PushBlock {
     float diffuse;           // fraction of white that is scattered
     float specular;          // of the light's mirror image
     float shininess;         // its exponent
+    float spray;             // share of white at the speed after it, and above
+    float spray_speed;
 } push;
 layout(location = 0) out vec4 out_color;
 #include "environment.glsl"
 #include "scene.glsl"
+#include "upsample.glsl"
 
 const uint SSFR = 0u;       // the normal, times T, is the offset
 const uint SSFR_INDEX = 1u; // where the bent ray's direction vanishes, with an index that grows with T
@@ -61,7 +68,15 @@ vec3 refracted(vec3 dir, vec3 n, float t_weight) {
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec3 v = view_ray(gl_FragCoord.xy), dir = normalize(v);
-    float depth = texelFetch(body_depth, ivec3(pixel, SIDE_FRONT), 0).x;
+    Front front;
+    if (HALF_RESOLUTION) {
+        front = upsampled(gl_FragCoord.xy);
+        // Over the host's picture a pixel is the liquid's or not.
+        if (HOST_BACKGROUND && front.coverage < 0.5) front.depth = 0.0;
+    } else {
+        front.depth = texelFetch(body_depth, ivec3(pixel, SIDE_FRONT), 0).x;
+    }
+    float depth = front.depth;
     bool inside = depth < 0.0; // a particle around the near plane: nothing to bend at
     if (depth == 0.0 || scene_hides(pixel, inside ? frame.near : depth)) {
         if (HOST_BACKGROUND) discard;
@@ -69,7 +84,7 @@ void main() {
         out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
         return;
     }
-    vec3 n = decode_normal(texelFetch(body_normal, ivec3(pixel, SIDE_FRONT), 0).x);
+    vec3 n = HALF_RESOLUTION ? front.normal : decode_normal(texelFetch(body_normal, ivec3(pixel, SIDE_FRONT), 0).x);
     if (inside) n = -dir;
     if (dot(dir, n) > 0.0) n = -n;
     float length_inside = 0.0;
@@ -90,6 +105,13 @@ void main() {
             color += push.diffuse * max(facing, 0.0);
             if (facing > 0.0 && mirror > 0.0) color += push.specular * exp(push.shininess * log(mirror));
         }
+#ifdef SPEED
+        // Spray: shifted to white by the velocity map (Cords08 section 4).
+        float fast = HALF_RESOLUTION ? front.speed : texelFetch(speed, pixel, 0).x;
+        color = mix(color, vec3(1.0), push.spray * min(fast / push.spray_speed, 1.0));
+#endif
     }
+    // The liquid's edge runs between the maps' pixels.
+    if (HALF_RESOLUTION && !HOST_BACKGROUND && front.coverage < 1.0) color = mix(behind(pixel, dir), color, front.coverage);
     out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
 }

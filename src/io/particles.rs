@@ -33,15 +33,18 @@ use source::Source;
 
 /// The known extensions, lower case and without dot, each with what is read from it.
 pub const FORMATS: &[(&str, &str)] = &[
-    ("vtk", "legacy VTK, ASCII or binary: any data set with POINTS; point array `class`"),
-    ("vtu", "VTK XML unstructured grid, inline or appended, plain or zlib; point array `class`"),
+    ("vtk", "legacy VTK, ASCII or binary: any data set with POINTS; point arrays `class`, `velocity` (or `v`, `U`)"),
+    ("vtu", "VTK XML unstructured grid, inline or appended, plain or zlib; point arrays as .vtk"),
     ("vtp", "VTK XML poly data, as .vtu"),
-    ("ply", "PLY, ASCII or binary: element `vertex` with x, y, z; property `class`"),
-    ("bgeo", "Houdini/Partio BGEO version 5, plain or gzip; attribute `class`"),
+    ("ply", "PLY, ASCII or binary: element `vertex` with x, y, z; properties `class`, vx, vy, vz"),
+    ("bgeo", "Houdini/Partio BGEO version 5, plain or gzip; attributes `class`, `v` (or `velocity`)"),
     ("xyz", "raw little-endian float32 triples, or text columns x y z with decimal points"),
-    ("csv", "columns x, y, z by header, or the first three, with decimal points; columns `class`, `radius`"),
+    (
+        "csv",
+        "columns x, y, z by header, or the first three, with decimal points; columns `class`, `radius`, vx, vy, vz",
+    ),
     ("npy", "NumPy array N x 3"),
-    ("npz", "NumPy archive: `position` N x 3; `radius`, `support`, `class`, `axes` N x 3 x 3"),
+    ("npz", "NumPy archive: `position` N x 3; `radius`, `support`, `class`, `velocity` N x 3, `axes` N x 3 x 3"),
 ];
 
 /// What a particle file held. Lengths are in the file's own units.
@@ -55,6 +58,8 @@ pub struct ParticleFile {
     pub support: Option<f64>,
     /// For each particle 0 (splash) or 1 (body).
     pub classes: Option<Vec<u8>>,
+    /// For each particle its velocity, in the file's units of length a second; as finite as positions are.
+    pub velocities: Option<Vec<DVec3>>,
     /// For each particle its anisotropic kernel: the columns are the semi-axis vectors (the *rows* of the file's `axes`).
     pub axes: Option<Vec<DMat3>>,
 }
@@ -128,9 +133,9 @@ pub enum ReadError {
         quote::path(path)
     )]
     UnequalLengths { path: PathBuf, array: String, found: usize, expected: usize },
-    /// Positions are infinite or not a number.
+    /// Positions or velocities are infinite or not a number.
     #[error(
-        "{}: {count} of {total} positions are not finite, the first at index {first}; `--drop-invalid` leaves them out",
+        "{}: {count} of {total} particles have a position or velocity that is not finite, the first at index {first}; `--drop-invalid` leaves them out",
         quote::path(path)
     )]
     NonFinite { path: PathBuf, first: usize, count: usize, total: usize },
@@ -213,7 +218,11 @@ pub fn read_bytes(name: &Path, bytes: &[u8], budget: &Budget) -> Result<Particle
     let source = Source { path: name, bytes, ledger: &ledger };
     let file = guard::quietly(|| reader(&source))
         .unwrap_or_else(|panic| Err(ReadError::Panicked { path: name.into(), panic }))?;
-    let lengths = [("class", file.classes.as_ref().map(Vec::len)), ("axes", file.axes.as_ref().map(Vec::len))];
+    let lengths = [
+        ("class", file.classes.as_ref().map(Vec::len)),
+        ("velocity", file.velocities.as_ref().map(Vec::len)),
+        ("axes", file.axes.as_ref().map(Vec::len)),
+    ];
     for (array, length) in lengths {
         if let Some(found) = length.filter(|length| *length != file.positions.len()) {
             return Err(ReadError::UnequalLengths {
@@ -245,12 +254,13 @@ fn reader(path: &Path) -> Result<Reader, ReadError> {
     })
 }
 
-/// Applies `policy` to the positions of `file` that are infinite or not a number; returns how many particles were dropped.
+/// Applies `policy` to the particles of `file` whose position or velocity is infinite or not a number; returns how many particles were dropped.
 ///
 /// # Errors
 /// [`ReadError::NonFinite`] under [`Invalid::Reject`], with `path` in its message.
 pub fn check_finite(file: &mut ParticleFile, policy: Invalid, path: &Path) -> Result<usize, ReadError> {
-    let keep: Vec<bool> = file.positions.iter().map(|p| p.is_finite()).collect();
+    let moves = |i: usize| file.velocities.as_ref().and_then(|v| v.get(i)).is_none_or(|v| v.is_finite());
+    let keep: Vec<bool> = file.positions.iter().enumerate().map(|(i, p)| p.is_finite() && moves(i)).collect();
     let Some(first) = keep.iter().position(|keep| !keep) else {
         return Ok(0);
     };
@@ -264,6 +274,7 @@ pub fn check_finite(file: &mut ParticleFile, policy: Invalid, path: &Path) -> Re
     }
     compact(&mut file.positions, &keep);
     file.classes.iter_mut().for_each(|classes| compact(classes, &keep));
+    file.velocities.iter_mut().for_each(|velocities| compact(velocities, &keep));
     file.axes.iter_mut().for_each(|axes| compact(axes, &keep));
     Ok(count)
 }

@@ -6,7 +6,7 @@ pub mod twin;
 
 use super::{
     Body, Layered, Layering,
-    splat::{classes, particles, surface},
+    splat::{classes, depth_test, particles, surface},
     split::BODY,
 };
 use crate::{
@@ -15,18 +15,19 @@ use crate::{
     parameters::parameters,
     passes::Drawn,
     plan::{Blend, Call, External, Plan, Rendering},
-    shader::{SIDE_FRONT, THICKNESS_FRAG},
+    shader::{SIDE_FRONT, SPEED_FRAG, THICKNESS_FRAG},
 };
-use ash::vk::Format;
+use ash::vk::{CompareOp, Format};
 
 parameters! {
-    /// The nearest surface of all particles, and where the optics ask for it the thickness of all behind it (Green10).
+    /// The nearest surface of all particles, and where the optics ask for it the thickness of all behind it (Green10)
+    /// or how fast it is (Cords08).
     pub struct Front {}
 }
 
 impl Layering for Front {
     fn offers(&self) -> Offers {
-        Offers { backs: false, normals: true, thickness: true }
+        Offers { backs: false, normals: true, thickness: true, half: true, speeds: true }
     }
 
     fn may_cull(&self, scene: &Scene) -> bool {
@@ -42,7 +43,7 @@ impl Layering for Front {
             let rendering = Rendering::into(thickness, 0).blending(Blend::Add, [0.0; 4]);
             let fragment = &THICKNESS_FRAG[usize::from(scene.has_scene)];
             let mut draws: Vec<(Call, _)> =
-                all.iter().flat_map(|class| particles(scene, drawn, fragment, *class, SIDE_FRONT)).collect();
+                all.iter().flat_map(|class| particles(scene, drawn, fragment, *class, SIDE_FRONT, None)).collect();
             if scene.has_scene {
                 let depth = plan.given(External::SceneDepth);
                 draws = draws.into_iter().map(|(call, v)| (call.read("scene_depth", depth), v)).collect();
@@ -50,6 +51,15 @@ impl Layering for Front {
             plan.render("thickness", rendering, draws);
             thickness
         });
-        Layered { splash: None, body: Some(Body::from(body)), thickness }
+        let speed = scene.asks().speeds.then(|| {
+            let speed = plan.flat("speed", Format::R32_SFLOAT);
+            let test = depth_test(plan);
+            let rendering = Rendering::into(speed, 0).testing(test, 0.0, CompareOp::GREATER);
+            let speeds = Some(plan.given(External::Speeds));
+            let draws = all.iter().flat_map(|c| particles(scene, drawn, &SPEED_FRAG, *c, SIDE_FRONT, speeds));
+            plan.render("speed", rendering, draws.collect());
+            speed
+        });
+        Layered { splash: None, body: Some(Body::from(body)), thickness, speed }
     }
 }

@@ -41,6 +41,8 @@ pub(crate) struct Layered {
     pub body: Option<Body>,
     /// Length of view rays inside particles, in particle radii, all of them added (`R32_SFLOAT`, no layers).
     pub thickness: Option<Target>,
+    /// Speed of the particle in front, in world units a second (`R32_SFLOAT`, no layers); 0 where there is none.
+    pub speed: Option<Target>,
 }
 
 /// A surface before it is smoothed.
@@ -67,6 +69,8 @@ pub(crate) struct Surfaces {
     pub body: Option<Surface>,
     /// As of [`Layered::thickness`].
     pub thickness: Option<Target>,
+    /// As of [`Layered::speed`].
+    pub speed: Option<Target>,
 }
 
 /// Maps of one class. Layer 0 is the nearest front, layer 1, if there is one, the farthest back.

@@ -25,7 +25,7 @@ parameters! {
 
 impl Layering for NearestFarthest {
     fn offers(&self) -> Offers {
-        Offers { backs: true, normals: false, thickness: false }
+        Offers { backs: true, ..Offers::default() }
     }
 
     fn may_cull(&self, _: &Scene) -> bool {
@@ -36,13 +36,13 @@ impl Layering for NearestFarthest {
     fn record(&self, plan: &mut Plan, scene: &Scene, drawn: &Drawn) -> Layered {
         let peeled = plan.flat("nearest and farthest depth", Format::R32G32_SFLOAT);
         let rendering = Rendering::into(peeled, 0).blending(Blend::Largest, [f32::NEG_INFINITY, 0.0, 0.0, 0.0]);
-        let draws = classes(scene).flat_map(|class| particles(scene, drawn, &EXTREMES_FRAG, class, SIDE_FRONT));
+        let draws = classes(scene).flat_map(|class| particles(scene, drawn, &EXTREMES_FRAG, class, SIDE_FRONT, None));
         plan.render("nearest and farthest", rendering, draws.collect());
         let sides = scene.sides();
         let depth = plan.map("body depth (ray-cast)", Format::R32_SFLOAT, sides);
         let call = Call::compute(&EXTREMES_COMP).read("peeled", peeled).write("depth_out", depth);
-        let [width, height] = plan.size.map(|s| s.div_ceil(IMAGE_GROUP));
+        let [width, height] = plan.size().map(|s| s.div_ceil(IMAGE_GROUP));
         plan.dispatch("sides", call, Groups::Direct([width, height, sides]));
-        Layered { splash: None, body: Some(Body { depth, normal: None, sides }), thickness: None }
+        Layered { splash: None, body: Some(Body { depth, normal: None, sides }), thickness: None, speed: None }
     }
 }

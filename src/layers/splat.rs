@@ -5,29 +5,32 @@ use super::Surface;
 use crate::{
     frame::Scene,
     passes::Drawn,
-    plan::{Call, Plan, Rendering, Vertices},
+    plan::{Call, Plan, Rendering, Target, Vertices},
     shader::{self, CLASS_BODY, CLASS_SPLASH, SIDE_BACK, SIDE_FRONT, Shader, Splat},
 };
 use ash::vk::{CompareOp, Format, PrimitiveTopology};
 
 /// Draws of one class as it shows on one side: as points, and as quads where those are too small. One of the two draws
-/// nothing: the compact pass chose.
+/// nothing: the compact pass chose. `speeds`, of all particles, for a shader that asks for them.
 pub(super) fn particles(
     scene: &Scene,
     drawn: &Drawn,
     fragment: &'static Shader,
     class: u32,
     side: u32,
+    speeds: Option<Target>,
 ) -> Vec<(Call, Vertices)> {
     let draw = |quads: bool| {
         let topology = if quads { PrimitiveTopology::TRIANGLE_STRIP } else { PrimitiveTopology::POINT_LIST };
-        let call = Call::draw(&shader::SPLAT_VERT[usize::from(quads)], fragment)
+        let vertex = usize::from(quads) + 2 * usize::from(speeds.is_some());
+        let call = Call::draw(&shader::SPLAT_VERT[vertex], fragment)
             .topology(topology)
             .read("centers", drawn.particles.centers)
             .read("diagonals", drawn.particles.diagonals)
             .read("mixed", drawn.particles.mixed)
             .read("drawn", drawn.lists)
             .push_all(&Splat { cls: class, side });
+        let call = speeds.into_iter().fold(call, |call, speeds| call.read("speeds", speeds));
         let half = size_of::<shader::Draws>() as u64 / 2;
         let offset = u64::from(2 * class + side) * 2 * half + if quads { half } else { 0 };
         (call, Vertices::Indirect(drawn.draws, offset))
@@ -48,6 +51,11 @@ pub(super) struct Names {
     pub passes: [&'static str; 2],
 }
 
+/// What depths are tested against, in one draw after the other.
+pub(super) fn depth_test(plan: &mut Plan) -> Target {
+    plan.find("splat depth test").unwrap_or_else(|| plan.flat("splat depth test", Format::D32_SFLOAT))
+}
+
 /// Draws some classes together, on each side that is wanted.
 pub(super) fn surface(
     plan: &mut Plan,
@@ -60,12 +68,12 @@ pub(super) fn surface(
     let depth = plan.map(names.depth, Format::R32_SFLOAT, sides);
     let normal = plan.map(names.normal, Format::R32_UINT, sides);
     // The depth test of whichever class and side is being drawn.
-    let test = plan.find("splat depth test").unwrap_or_else(|| plan.flat("splat depth test", Format::D32_SFLOAT));
+    let test = depth_test(plan);
     for side in [SIDE_FRONT, SIDE_BACK].into_iter().take(sides as usize) {
         // The depth test works on near / d: nearest is largest. Nothing there: 0 for fronts, 1 for backs.
         let (compare, clear) = if side == SIDE_FRONT { (CompareOp::GREATER, 0.0) } else { (CompareOp::LESS, 1.0) };
         let rendering = Rendering::into(depth, side).and(normal, side).testing(test, clear, compare);
-        let draws = classes.iter().flat_map(|class| particles(scene, drawn, &shader::SPLAT_FRAG, *class, side));
+        let draws = classes.iter().flat_map(|class| particles(scene, drawn, &shader::SPLAT_FRAG, *class, side, None));
         plan.render(names.passes[side as usize], rendering, draws.collect());
     }
     Surface { depth, normal, sides }

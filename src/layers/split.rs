@@ -24,7 +24,7 @@ pub(super) const BODY: Names =
 
 impl Layering for Split {
     fn offers(&self) -> Offers {
-        Offers { backs: true, normals: true, thickness: false }
+        Offers { backs: true, normals: true, ..Offers::default() }
     }
 
     fn may_cull(&self, _: &Scene) -> bool {
@@ -36,6 +36,6 @@ impl Layering for Split {
         let mut surface = |class, names| splat::surface(plan, scene, drawn, &[class], sides, names);
         let splash = scene.splash.then(|| surface(CLASS_SPLASH, &SPLASH));
         let body = scene.body.then(|| surface(CLASS_BODY, &BODY));
-        Layered { splash, body: body.map(Body::from), thickness: None }
+        Layered { splash, body: body.map(Body::from), thickness: None, speed: None }
     }
 }

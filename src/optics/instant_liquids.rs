@@ -4,7 +4,7 @@ use super::{
     Fresnel, Shading,
     lookup::{Lookup, Mode},
 };
-use crate::{frame::Scene, layers::Surfaces, parameters::parameters, plan::Plan};
+use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::parameters, plan::Plan};
 use glam::Vec3;
 
 parameters! {
@@ -23,10 +23,20 @@ parameters! {
         specular: f32 = 0.5, "", "a finite value of at least 0" => |s| s.is_finite() && *s >= 0.0;
         /// Exponent of the mirror image: the larger, the smaller that is
         shininess: f32 = 64.0, "", "1 to 10000" => |s| (1.0..=10000.0).contains(s);
+        /// Whether the surface is drawn and smoothed at half the picture's width and height, and upsampled (Cords08 section 5)
+        half_resolution: bool = false, "", "true or false" => |_| true;
+        /// Spray: share of white where the liquid is as fast as spray_speed; above 0 the particles need velocities
+        spray: f32 = 0.0, "", "0 to 1" => |s| (0.0..=1.0).contains(s);
+        /// Speed at which spray is whitest
+        spray_speed: f32 = 1.0, "world units / second", "a finite value above 0" => |s| s.is_finite() && *s > 0.0;
     }
 }
 
 impl Shading for InstantLiquids {
+    fn asks(&self) -> Offers {
+        Offers { half: self.half_resolution, speeds: self.spray > 0.0, ..Offers::default() }
+    }
+
     fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
         Lookup::from(*self).record(plan, scene, surfaces);
     }
@@ -41,6 +51,8 @@ impl From<InstantLiquids> for Lookup {
             fresnel: p.fresnel,
             light: p.light,
             phong: [p.diffuse, p.specular, p.shininess],
+            half_resolution: p.half_resolution,
+            spray: [p.spray, p.spray_speed],
         }
     }
 }

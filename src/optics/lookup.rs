@@ -40,6 +40,10 @@ pub struct Lookup {
     pub light: Vec3,
     /// Fraction of white that is scattered, that is mirrored, and the exponent of that (Phong).
     pub phong: [f32; 3],
+    /// Whether the surfaces are of half the picture's width and height, and upsampled.
+    pub half_resolution: bool,
+    /// Share of white, and the speed in world units a second at which and above which there is so much (Cords08 §4).
+    pub spray: [f32; 2],
 }
 
 impl Lookup {
@@ -57,10 +61,12 @@ impl Lookup {
     pub(super) fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
         let body = surfaces.body.unwrap_or_else(|| super::walk::placeholder(plan));
         let (cube, thickness) = (scene.environment == EnvironmentShape::Cube, surfaces.thickness);
-        let variant = usize::from(scene.has_scene) + 2 * usize::from(cube) + 4 * usize::from(thickness.is_some());
+        let given = [scene.has_scene, cube, thickness.is_some(), surfaces.speed.is_some()];
+        let variant = given.into_iter().enumerate().map(|(i, given)| usize::from(given) << i).sum::<usize>();
         let light = self.light.as_dvec3().normalize_or_zero().as_vec3();
         let light = scene.eye.transform_vector3(light);
         let [diffuse, specular, shininess] = self.phong;
+        let [spray, spray_speed] = self.spray;
         let mut call = Call::draw(&VIEW_VERT, &LOOKUP_FRAG[variant])
             .read("body_depth", body.depth)
             .read("body_normal", body.normal)
@@ -69,6 +75,7 @@ impl Lookup {
             .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact)
             .constant("ENCODE_SRGB", scene.encode_srgb())
             .constant("HOST_BACKGROUND", scene.background == Background::Host)
+            .constant("HALF_RESOLUTION", self.half_resolution)
             // Positions of the picture that far off are still finite.
             .push("strength", self.strength.min(1e30))
             .push("thickness_scale", self.thickness_scale)
@@ -77,9 +84,14 @@ impl Lookup {
             .push("light_z", light.z)
             .push("diffuse", diffuse)
             .push("specular", specular)
-            .push("shininess", shininess);
+            .push("shininess", shininess)
+            .push("spray", spray)
+            .push("spray_speed", spray_speed);
         if let Some(thickness) = thickness {
             call = call.read("thickness", thickness);
+        }
+        if let Some(speed) = surfaces.speed {
+            call = call.read("speed", speed);
         }
         if scene.has_scene {
             call = call

@@ -39,6 +39,8 @@ impl From<Ssfr> for Lookup {
             fresnel: p.fresnel,
             light: Vec3::ZERO,
             phong: [0.0; 3],
+            half_resolution: false,
+            spray: [0.0, 1.0],
         }
     }
 }

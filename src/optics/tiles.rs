@@ -10,7 +10,7 @@ use ash::vk::Format;
 
 /// Of both classes together: layer 0 holds each tile's smallest front depth, layer 1 the largest.
 pub(super) fn record(plan: &mut Plan, surfaces: &Surfaces, body: &Surface, splash: &Surface) -> Target {
-    let size = plan.size.map(|s| s.div_ceil(FRONT_TILE));
+    let size = plan.size().map(|s| s.div_ceil(FRONT_TILE));
     let spec = ImageSpec { format: Format::R32_SFLOAT, size, layers: 2, array: true, usage: Default::default() };
     let ranges = plan.image("front depth tiles", spec);
     let call = Call::compute(&TILES_COMP)

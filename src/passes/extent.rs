@@ -4,6 +4,7 @@ use super::per_block;
 use crate::{
     frame::Scene,
     plan::{Call, External, Groups, Plan, Target},
+    scale::Scale,
     shader::{EXTENT_MOST, EXTENT_PLAN_COMP, EXTENT_REDUCE_COMP, EXTENT_WORDS, Prepare},
 };
 use ash::vk;
@@ -11,14 +12,20 @@ use ash::vk;
 /// Gives the buffer of what it found.
 pub(crate) fn record(plan: &mut Plan, scene: &Scene, prepare: &Prepare) -> Target {
     let extent = plan.buffer("extent", 4 * u64::from(EXTENT_WORDS));
-    let (frame, positions) = (plan.given(External::FrameBlock), plan.given(External::Positions));
+    let positions = plan.given(External::Positions);
     let least = 4 * u64::from(EXTENT_MOST);
     plan.fill("extent", extent, 0, least, u32::MAX);
     plan.fill("extent", extent, least, vk::WHOLE_SIZE, 0);
     let reduce = Call::compute(&EXTENT_REDUCE_COMP).counting(&["not_finite"]);
     let relation = prepare.entries_per_particle != 1;
-    let find = Call::compute(&EXTENT_PLAN_COMP).update("frame", frame).constant("RELATION_TABLE", relation);
-    for (call, groups) in [(reduce, per_block(scene.count)), (find, Groups::Direct([1, 1, 1]))] {
+    let mut calls = vec![(reduce, per_block(scene.count))];
+    // The block of each scale at which the frame works is completed on its own; what else that finds is the same each time.
+    for scale in Scale::ALL.into_iter().filter(|s| *s == Scale::Full || *s == scene.scale()) {
+        let frame = plan.given(External::FrameBlock(scale));
+        let find = Call::compute(&EXTENT_PLAN_COMP).update("frame", frame).constant("RELATION_TABLE", relation);
+        calls.push((find, Groups::Direct([1, 1, 1])));
+    }
+    for (call, groups) in calls {
         let call = call.read("positions", positions).update("extent", extent).push_all(prepare);
         plan.dispatch("extent", call, groups);
     }

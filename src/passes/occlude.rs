@@ -9,7 +9,8 @@ use crate::{
 
 /// Two 32-bit bounds a pixel: nearest front, then farthest back.
 pub(crate) fn record(plan: &mut Plan, scene: &Scene, particles: &Arrays) -> Target {
-    let half = 4 * u64::from(plan.size[0]) * u64::from(plan.size[1]);
+    let [width, height] = plan.size().map(u64::from);
+    let half = 4 * width * height;
     let bounds = plan.buffer("body depth bounds", 2 * half);
     // No front is certain: infinitely far. No back: at the eye.
     plan.fill("occlude", bounds, 0, half, f32::INFINITY.to_bits());

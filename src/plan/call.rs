@@ -211,7 +211,7 @@ impl Call {
             if b.kind != Kind::UniformBuffer(size_of::<crate::shader::Frame>() as u32) {
                 return Err(format!("{} is {:?}, and no frame block", b.name, b.kind));
             }
-            self.bound.push((*b, plan.given(External::FrameBlock), Access::UniformRead));
+            self.bound.push((*b, plan.given(External::FrameBlock(plan.scale)), Access::UniformRead));
         }
         for (name, target, touch) in std::mem::take(&mut self.named) {
             let Some(b) = bindings.iter().find(|b| b.name == name) else {
@@ -276,8 +276,8 @@ fn fits(plan: &Plan, b: &Binding, target: Target) -> Result<(), String> {
         (Some(texels), Made::Given(External::Environment)) => !texels.uint,
         (None, Made::Own(Spec::Buffer { .. })) => true,
         (None, Made::Given(given)) => {
-            use External::{Centers, Diagonals, FrameBlock, Mixed, Positions};
-            matches!(given, FrameBlock | Positions | Centers | Diagonals | Mixed)
+            use External::{Centers, Diagonals, FrameBlock, Mixed, Positions, Speeds};
+            matches!(given, FrameBlock(_) | Positions | Centers | Diagonals | Mixed | Speeds)
         }
         _ => false,
     };

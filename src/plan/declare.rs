@@ -1,7 +1,10 @@
 //! How passes declare their resources.
 
 use super::{Declared, External, Home, Made, Plan, Target};
-use crate::resources::{ImageSpec, Spec};
+use crate::{
+    resources::{ImageSpec, Spec},
+    scale::Scale,
+};
 use ash::vk;
 
 /// The buffers of counters, of the particles and of the view.
@@ -18,12 +21,12 @@ impl Plan {
 
     /// A map of the whole view with one layer for each of so many sides: front, then back. Shaders see an array.
     pub fn map(&mut self, name: &'static str, format: vk::Format, sides: u32) -> Target {
-        self.image(name, ImageSpec { format, size: self.size, layers: sides, array: true, usage: Default::default() })
+        self.image(name, ImageSpec { format, size: self.size(), layers: sides, array: true, usage: Default::default() })
     }
 
     /// A map of the whole view without layers.
     pub fn flat(&mut self, name: &'static str, format: vk::Format) -> Target {
-        self.image(name, ImageSpec { format, size: self.size, layers: 1, array: false, usage: Default::default() })
+        self.image(name, ImageSpec { format, size: self.size(), layers: 1, array: false, usage: Default::default() })
     }
 
     /// Any image; what it is used for follows from its uses.
@@ -74,11 +77,13 @@ impl Plan {
             return Target(at);
         }
         let (name, home) = match external {
-            External::FrameBlock => ("frame block", Home::View),
+            External::FrameBlock(Scale::Full) => ("frame block", Home::View),
+            External::FrameBlock(Scale::Half) => ("frame block (half)", Home::View),
             External::Positions => ("positions (host's)", Home::Particles),
             External::Centers => ("particle centres", Home::Particles),
             External::Diagonals => ("particle shapes (diagonal)", Home::Particles),
             External::Mixed => ("particle shapes (mixed)", Home::Particles),
+            External::Speeds => ("particle speeds", Home::Particles),
             External::Environment => ("environment", Home::View),
             External::SceneColor => ("scene colour (host's)", Home::View),
             External::SceneDepth => ("scene depth (host's)", Home::View),

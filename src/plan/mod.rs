@@ -17,6 +17,7 @@ use crate::{
     Error,
     access::Access,
     resources::{ImageSpec, Spec},
+    scale::Scale,
 };
 use ash::vk;
 
@@ -35,12 +36,13 @@ pub(crate) enum Home {
 /// What the frame uses and does not own; barriers for it are its owner's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum External {
-    /// The slot's uniform block, which the host has just written.
-    FrameBlock,
+    /// The slot's uniform block for passes at this scale, which the host has just written.
+    FrameBlock(Scale),
     Positions,
     Centers,
     Diagonals,
     Mixed,
+    Speeds,
     Environment,
     SceneColor,
     SceneDepth,
@@ -65,8 +67,8 @@ pub(crate) struct Declared {
 
 /// A frame's resources and steps.
 pub(crate) struct Plan {
-    /// Width and height of the view in pixels.
-    pub size: [u32; 2],
+    /// Width and height of the picture in pixels.
+    pub picture: [u32; 2],
     pub resources: Vec<Declared>,
     pub steps: Vec<Step>,
     /// Names of the counters of each home.
@@ -76,15 +78,16 @@ pub(crate) struct Plan {
     pub surfaces: crate::inspect::SurfaceNames,
     home: Home,
     part: &'static str,
+    scale: Scale,
     /// What a pass got wrong first.
     wrong: Option<Error>,
 }
 
 impl Plan {
     /// An empty frame of so many pixels.
-    pub fn new(size: [u32; 2]) -> Plan {
+    pub fn new(picture: [u32; 2]) -> Plan {
         Plan {
-            size,
+            picture,
             resources: Vec::new(),
             steps: Vec::new(),
             counters: Default::default(),
@@ -92,6 +95,7 @@ impl Plan {
             surfaces: Default::default(),
             home: Home::Particles,
             part: "",
+            scale: Scale::Full,
             wrong: None,
         }
     }
@@ -99,6 +103,17 @@ impl Plan {
     /// Says what the passes that follow work for, and as what part of the frame.
     pub fn work_for(&mut self, home: Home, part: &'static str) {
         (self.home, self.part) = (home, part);
+    }
+
+    /// Says at what scale of the picture the passes that follow work: the maps that they declare and the block that they read
+    /// are of that scale.
+    pub fn work_at(&mut self, scale: Scale) {
+        self.scale = scale;
+    }
+
+    /// Width and height of the view in pixels, at the scale of the passes at work.
+    pub fn size(&self) -> [u32; 2] {
+        self.scale.size(self.picture)
     }
 
     /// The plan, unless a pass declared something that cannot be.

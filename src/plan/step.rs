@@ -196,7 +196,7 @@ impl Plan {
 
     /// Width and height of what is drawn into.
     pub fn attachment_size(&self, target: Target) -> [u32; 2] {
-        self.image_spec(target).map_or(self.size, |spec| spec.size)
+        self.image_spec(target).map_or(self.picture, |spec| spec.size)
     }
 }
 

@@ -71,6 +71,9 @@ pub enum PrepareError {
     /// A position that is not finite.
     #[error("particle {index} at {position} is not finite: remove it")]
     Position { index: usize, position: Vec3 },
+    /// A velocity that is not finite.
+    #[error("the velocity {velocity} of particle {index} is not finite: remove it")]
+    Velocity { index: usize, velocity: Vec3 },
     /// An array that does not hold one entry for each particle.
     #[error("{what}: {found} of them for {particles} particles; give one for each, or none at all")]
     Length { what: &'static str, found: usize, particles: usize },
@@ -124,6 +127,30 @@ pub fn prepare_with_progress(
     options: &Options,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<(Particles, Report), PrepareError> {
+    prepare_all(input, None, options, progress).map(|(particles, report, _)| (particles, report))
+}
+
+/// [`prepare_with_progress`] of particles whose velocities are known, in world units a second: also gives the speed of each
+/// particle as drawn, for [`crate::Renderer::set_speeds`].
+pub fn prepare_with_velocities(
+    input: &Input,
+    velocities: &[Vec3],
+    options: &Options,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<(Particles, Report, Vec<f32>), PrepareError> {
+    check_lengths("velocities", Some(velocities.len()), input.positions.len())?;
+    if let Some(index) = velocities.iter().position(|v| !v.is_finite()) {
+        return Err(PrepareError::Velocity { index, velocity: velocities[index] });
+    }
+    prepare_all(input, Some(velocities), options, progress)
+}
+
+fn prepare_all(
+    input: &Input,
+    velocities: Option<&[Vec3]>,
+    options: &Options,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<(Particles, Report, Vec<f32>), PrepareError> {
     let Input { positions, radius, classes, ellipsoids } = *input;
     let scale = Scale::new(radius, options)?;
     check_lengths("classes", classes.map(<[_]>::len), positions.len())?;
@@ -133,7 +160,8 @@ pub fn prepare_with_progress(
     // What tells particles at the same place apart.
     let extra = |i: u32| {
         let axes = ellipsoids.map(|given| given[i as usize].to_cols_array().map(f32::to_bits));
-        (classes.map(|given| given[i as usize] as u8), axes)
+        let velocity = velocities.map(|given| given[i as usize].to_array().map(f32::to_bits));
+        (classes.map(|given| given[i as usize] as u8), axes, velocity)
     };
     let grid = Grid::new(positions, scale.support, |a, b| extra(a).cmp(&extra(b)))?;
     let classes: Vec<Class> = match classes {
@@ -162,7 +190,15 @@ pub fn prepare_with_progress(
         }
     };
     progress(positions.len());
-    Ok(assemble(radius, &classes, &shapes))
+    let (particles, report) = assemble(radius, &classes, &shapes);
+    let of_class = |class: Class| {
+        let moving = grid.order.iter().zip(&classes).filter(move |(_, c)| **c == class);
+        // In double precision: squares may not be float32 numbers.
+        let speed = |v: Vec3| v.as_dvec3().length().min(f64::from(f32::MAX)) as f32;
+        moving.filter_map(move |(i, _)| velocities.map(|v| speed(v[*i as usize])))
+    };
+    let speeds = of_class(Class::Splash).chain(of_class(Class::Body)).collect();
+    Ok((particles, report, speeds))
 }
 
 fn sphere(center: Vec3, radius: f32) -> Ellipsoid {

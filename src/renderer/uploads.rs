@@ -4,6 +4,7 @@ use super::{Renderer, SceneBounds};
 use crate::{
     Error, access,
     environment::Equirect,
+    frame::Scene,
     particles::Particles,
     prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},
@@ -15,7 +16,7 @@ use gpu_allocator::MemoryLocation;
 
 impl Renderer {
     /// Gives the particles of the frames to come. The host's memory is copied; the last particles are kept until the
-    /// frames that draw them have completed.
+    /// frames that draw them have completed. Speeds given before go with the last particles.
     pub fn set_particles(&mut self, particles: &Particles) -> Result<(), Error> {
         let count = particles.ellipsoids.len();
         if !space::RADII.contains(&particles.radius) {
@@ -69,8 +70,44 @@ impl Renderer {
             self.retire(Resource::Buffer(old));
         }
         let bounds = particles.bounds().unwrap_or_default();
+        self.speeds.take().into_iter().for_each(|old| self.retire(Resource::Buffer(old)));
         self.scene = SceneBounds { space, splash: particles.splash_count, body: particles.body_count(), bounds };
         Ok(())
+    }
+
+    /// Says how fast the particles of [`Renderer::set_particles`] are, in world units a second and in their order; for spray
+    /// ([`crate::optics::instant_liquids`]). [`crate::prepare::prepare_with_velocities`] gives speeds in this order.
+    pub fn set_speeds(&mut self, speeds: &[f32]) -> Result<(), Error> {
+        let count = self.scene.splash + self.scene.body;
+        if speeds.len() != count {
+            return Err(Error::parameter("speeds", speeds.len(), format!("give one for each of {count} particles")));
+        }
+        if let Some(i) = speeds.iter().position(|s| !(s.is_finite() && *s >= 0.0)) {
+            let what = format!("number {i} is {}", speeds[i]);
+            return Err(Error::parameter("speeds", what, "use finite values of at least 0"));
+        }
+        let (bytes, usage) = (4 * count.max(1) as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
+        let mut buffer = Buffer::new(&self.host, SPEEDS, bytes, usage, MemoryLocation::CpuToGpu)?;
+        buffer.mapped()[..size_of_val(speeds)].copy_from_slice(bytemuck::cast_slice(speeds));
+        if let Some(old) = self.speeds.replace(buffer) {
+            self.retire(Resource::Buffer(old));
+        }
+        Ok(())
+    }
+
+    /// Refuses a frame that needs speeds and has none.
+    pub(super) fn check_speeds(&self, scene: &Scene) -> Result<(), Error> {
+        if !scene.asks().speeds || scene.count == 0 {
+            return Ok(());
+        }
+        let remedy = match (&scene.prepare, &self.speeds) {
+            (None, Some(_)) => return Ok(()),
+            (None, None) => {
+                "the particles came without velocities: use a file that has them (or Renderer::set_speeds), or 0"
+            }
+            (Some(_), _) => "particles that the device prepares have no velocities: prepare them on the CPU, or use 0",
+        };
+        Err(Error::parameter("spray", "above 0", remedy))
     }
 
     /// Gives the environment of the frames to come; records its upload.
@@ -138,5 +175,7 @@ impl Renderer {
 pub(super) const PARTICLE_ARRAYS: [&str; 3] =
     ["particle centres", "particle shapes (diagonal)", "particle shapes (mixed)"];
 const ARRAY_BYTES: u64 = 12;
+/// A fourth holds how fast they are, where that is known.
+pub(super) const SPEEDS: &str = "particle speeds";
 /// Where indices of three floats each, or of a rectangle of work groups, would no longer fit 32 bits.
 const MOST_PARTICLES: u64 = 1 << 30;

@@ -96,6 +96,6 @@ pub(crate) fn record(plan: &mut Plan, filter: &Smooth, body: &Body) -> Surface {
 
 /// Groups of `edge` x `edge` invocations for each pixel of each side.
 fn per_pixel(plan: &Plan, edge: u32, sides: u32) -> Groups {
-    let [width, height] = plan.size.map(|s| s.div_ceil(edge));
+    let [width, height] = plan.size().map(|s| s.div_ceil(edge));
     Groups::Direct([width, height, sides])
 }

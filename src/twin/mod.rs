@@ -15,3 +15,4 @@ pub mod shape;
 pub mod sort;
 pub mod splat;
 pub mod tiles;
+pub mod upsample;

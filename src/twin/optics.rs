@@ -1,4 +1,4 @@
-//! Twin of `glsl/include/optics.glsl`: light at one water surface, and sRGB.
+//! Twin of `glsl/include/optics.glsl`: light at one water surface, and sRGB; and of the spray in `glsl/optics/lookup.frag`.
 
 pub use crate::srgb::{decode_srgb, encode_srgb, srgb_byte};
 use glam::Vec3;
@@ -25,4 +25,9 @@ pub fn refract(dir: Vec3, n: Vec3, eta: f32) -> Option<Vec3> {
 /// Mirror direction.
 pub fn reflect(dir: Vec3, n: Vec3) -> Vec3 {
     dir - 2.0 * dir.dot(n) * n
+}
+
+/// Spray (Cords08 §4): colour shifted to white, by the share `spray` at `whitest` and above.
+pub fn spray(color: Vec3, speed: f32, spray: f32, whitest: f32) -> Vec3 {
+    color.lerp(Vec3::ONE, spray * (speed / whitest).min(1.0))
 }

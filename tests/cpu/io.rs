@@ -90,6 +90,7 @@ fn reads_legacy_vtk() {
     let read = read_as("a.vtk", single);
     assert_eq!(read.positions, expected());
     assert_eq!(read.classes, Some(vec![1, 0, 1]));
+    assert_eq!(read.velocities, Some(expected()));
     let double = vtk("POLYDATA", "double", &bytes(|v| f64::from(v).to_be_bytes()), b"\n");
     assert_eq!(read_as("A.VTK", double).positions, expected());
     let ascii = format!(
@@ -304,7 +305,7 @@ fn reads_npz() {
     let positions = npy(&[3, 3], C, POSITIONS.as_flattened());
     let numbers: Vec<f64> = (0..27).map(f64::from).collect();
     let all = [
-        ("velocity", npy(&[3, 3], C, &[0.0_f32; 9])),
+        ("velocity", positions.clone()),
         ("position", positions.clone()),
         ("radius", npy(&[], C, &[0.025_f64])),
         ("support", npy(&[1], C, &[0.5_f32])),
@@ -316,6 +317,7 @@ fn reads_npz() {
         let read = read_as("a.npz", &content);
         assert_eq!(read.positions, expected());
         assert_eq!((read.radius, read.support), (Some(0.025), Some(0.5)));
+        assert_eq!(read.velocities, Some(expected()));
         assert_eq!(read.classes, Some(vec![1, 0, 1]));
         let axes = read.axes.unwrap();
         assert_eq!(axes.len(), 3);

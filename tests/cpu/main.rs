@@ -16,3 +16,5 @@ mod twin_normals;
 mod twin_optics;
 mod twin_plane_fit;
 mod twin_refract;
+#[cfg(feature = "io")]
+mod velocities;

@@ -97,6 +97,13 @@ impl<'a> Driver<'a> {
         self.shoot_input(case, 0, &|input| input)
     }
 
+    /// The same of particles whose speeds are known.
+    pub fn shoot_moving(&self, case: &Case, speeds: &[f32]) -> Shot {
+        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        self.session.borrow_mut().renderer.set_speeds(speeds).expect("speeds");
+        self.shoot_input(case, 0, &|input| input)
+    }
+
     /// The same for positions prepared on the device, with every neighbour listed; they begin at `offset` bytes of their
     /// buffer and lie `stride` bytes apart. Of the case's particles only the radius counts.
     pub fn shoot_cloud(&self, case: &Case, cloud: &Cloud) -> Shot {

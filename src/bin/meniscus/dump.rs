@@ -4,7 +4,7 @@ use crate::{choices, codes, options, outputs::Dump, render::Job};
 use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     host::Session,
-    inspect::{self, Walk},
+    inspect::{self, Spec, Walk},
     shader::{SIDE_BACK, SIDE_FRONT},
     smooth::Smooth,
     space::Space,
@@ -28,11 +28,15 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
         for (side, layer) in [("front", SIDE_FRONT), ("back", SIDE_BACK)] {
             let mut words = |name: Option<&'static str>| name.map_or(Ok(None), |name| session.words(name, layer));
             let (Some(depths), normals) = (words(depth)?, words(normal)?) else { continue };
-            out.maps(&format!("{class}_{side}"), raw, &depths, normals.as_deref())?;
+            let size = depth.map_or(job.size, |name| size_of_map(session, name));
+            out.maps(&format!("{class}_{side}"), raw, size, &depths, normals.as_deref())?;
         }
     }
     if let Some(words) = session.words("thickness", 0)? {
         out.array("thickness", 1, words.into_iter().map(|w| f32::from_bits(w) * out.radius))?;
+    }
+    if let Some(words) = session.words("speed", 0)? {
+        out.array_of("speed", size_of_map(session, "speed"), 1, words.into_iter().map(f32::from_bits))?;
     }
     // Not all optics walk.
     if let Some(words) = session.words("walk (debug)", 0)? {
@@ -54,6 +58,14 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     Ok(out.dump.finish()?)
 }
 
+/// Maps of optics that upsample are smaller than the picture.
+fn size_of_map(session: &Session, name: &str) -> [u32; 2] {
+    match session.renderer.spec(name) {
+        Some(Spec::Image(spec)) => spec.size,
+        _ => [0, 0],
+    }
+}
+
 fn floats(words: Vec<u32>) -> Vec<f32> {
     words.into_iter().map(f32::from_bits).collect()
 }
@@ -68,20 +80,24 @@ struct Folder<'a> {
 impl Folder<'_> {
     /// float32, H x W or H x W x `channels`, row 0 at the top.
     fn array(&self, name: &str, channels: u64, data: impl Iterator<Item = f32>) -> Result<()> {
-        let (h, w) = (u64::from(self.size[1]), u64::from(self.size[0]));
+        self.array_of(name, self.size, channels, data)
+    }
+
+    fn array_of(&self, name: &str, size: [u32; 2], channels: u64, data: impl Iterator<Item = f32>) -> Result<()> {
+        let [w, h] = size.map(u64::from);
         let shape: &[u64] = if channels == 1 { &[h, w] } else { &[h, w, channels] };
         Ok(self.dump.write(&format!("{name}.npy"), &npy(shape, data)?)?)
     }
 
-    fn maps(&self, surface: &str, raw: &str, depths: &[u32], normals: Option<&[u32]>) -> Result<()> {
+    fn maps(&self, surface: &str, raw: &str, size: [u32; 2], depths: &[u32], normals: Option<&[u32]>) -> Result<()> {
         let depth = |w: &u32| Some(self.radius * f32::from_bits(*w)).filter(|d| *d > 0.0);
-        self.array(&format!("{surface}_depth{raw}"), 1, depths.iter().map(|w| depth(w).unwrap_or(f32::NAN)))?;
+        self.array_of(&format!("{surface}_depth{raw}"), size, 1, depths.iter().map(|w| depth(w).unwrap_or(f32::NAN)))?;
         let Some(normals) = normals else { return Ok(()) };
         let normal = depths.iter().zip(normals).flat_map(|(d, n)| match depth(d) {
             Some(_) => decode_normal(*n).to_array(),
             None => [f32::NAN; 3],
         });
-        self.array(&format!("{surface}_normal{raw}"), 3, normal)
+        self.array_of(&format!("{surface}_normal{raw}"), size, 3, normal)
     }
 }
 

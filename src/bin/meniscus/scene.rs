@@ -28,6 +28,8 @@ pub struct Scene {
     pub prepare_ms: f64,
     /// Centres, relative to the origin.
     pub positions: Vec<Vec3>,
+    /// Of the particles as drawn, where the CPU prepared them and the file has velocities.
+    speeds: Option<Vec<f32>>,
     pub options: Options,
     density: Option<DensityField>,
 }
@@ -114,13 +116,15 @@ impl Scene {
             classes: classes.as_deref(),
             ellipsoids: axes.as_deref(),
         };
-        let (particles, report, prepare_ms) = make(&input, &options, prepare)?;
+        let velocities: Option<Vec<Vec3>> =
+            file.velocities.as_ref().map(|all| all.iter().map(|v| v.as_vec3()).collect());
+        let (particles, report, speeds, prepare_ms) = make(&input, velocities.as_deref(), &options, prepare)?;
         let density = if report.body > 0 || prepare.on_device() {
             Some(DensityField::new(&positions, radius as f32, &options)?)
         } else {
             None
         };
-        Ok(Scene { particles, report, origin, radius_source, dropped, prepare_ms, positions, options, density })
+        Ok(Scene { particles, report, origin, radius_source, dropped, prepare_ms, positions, speeds, options, density })
     }
 
     /// Positions that were made, not read.
@@ -128,7 +132,7 @@ impl Scene {
         let place = picture.place();
         let options = Options { search: place.search(picture.preparation.search), ..picture.preparation };
         let input = Input { positions: &positions, radius, classes: None, ellipsoids: None };
-        let (particles, report, prepare_ms) = make(&input, &options, place)?;
+        let (particles, report, speeds, prepare_ms) = make(&input, None, &options, place)?;
         Ok(Scene {
             particles,
             report,
@@ -137,6 +141,7 @@ impl Scene {
             dropped: 0,
             prepare_ms,
             positions,
+            speeds,
             options,
             density: None,
         })
@@ -148,6 +153,9 @@ impl Scene {
             return Ok(Some(Upload::new(session.gpu, bytemuck::cast_slice(&self.positions))?));
         }
         session.renderer.set_particles(&self.particles)?;
+        if let Some(speeds) = &self.speeds {
+            session.renderer.set_speeds(speeds)?;
+        }
         Ok(None)
     }
 
@@ -164,18 +172,29 @@ impl Scene {
     }
 }
 
-/// Particles as the CPU prepares them, or what is known before the device does; and the milliseconds that it took.
-fn make(input: &Input, options: &Options, place: Prepare) -> Result<(Particles, Report, f64), Box<dyn Error>> {
+/// What [`make`] gives.
+type Made = (Particles, Report, Option<Vec<f32>>, f64);
+
+/// Particles as the CPU prepares them, or what is known before the device does; how fast they are; and the
+/// milliseconds that it took.
+fn make(input: &Input, velocities: Option<&[Vec3]>, options: &Options, place: Prepare) -> Result<Made, Box<dyn Error>> {
     let bar = progress(input.positions.len() as u64, "classes and ellipsoids");
     let start = std::time::Instant::now();
-    let (particles, report) = if place.on_device() {
-        (uniform(input, options), Report::default())
-    } else {
-        prepare::prepare_with_progress(input, options, &|done| bar.set_position(done as u64))?
+    let progress = |done| bar.set_position(done as u64);
+    let (particles, report, speeds) = match velocities {
+        _ if place.on_device() => (uniform(input, options), Report::default(), None),
+        Some(velocities) => {
+            let (particles, report, speeds) = prepare::prepare_with_velocities(input, velocities, options, &progress)?;
+            (particles, report, Some(speeds))
+        }
+        None => {
+            let (particles, report) = prepare::prepare_with_progress(input, options, &progress)?;
+            (particles, report, None)
+        }
     };
     let ms = start.elapsed().as_secs_f64() * 1e3;
     bar.finish_and_clear();
-    Ok((particles, report, ms))
+    Ok((particles, report, speeds, ms))
 }
 
 /// Spheres as large as any ellipsoid that the device may make: for the camera, and for the box around the liquid.

@@ -7,7 +7,7 @@ use std::io::{BufReader, Read};
 use flate2::bufread::MultiGzDecoder;
 use glam::DVec3;
 
-use super::source::Source;
+use super::source::{Source, is_velocity};
 use super::{At, ParticleFile, ReadError};
 use crate::io::budget::Metered;
 use crate::io::quote::quote;
@@ -17,7 +17,7 @@ const POSITION: usize = 4;
 /// A point's record is at most so long: far more attributes than any writer makes.
 const WORDS: usize = 1 << 16;
 
-/// Reads the positions and the integer attribute `class`.
+/// Reads the positions, the integer attribute `class` and velocities.
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     if source.bytes.starts_with(&[0x1f, 0x8b]) {
         let inner = MultiGzDecoder::new(source.bytes);
@@ -65,22 +65,27 @@ fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<usize
     }
     let mut positions = source.room(points as u64, "positions")?;
     let mut classes = source.room(if layout.class.is_some() { points as u64 } else { 0 }, "classes")?;
+    let mut velocities = source.room(if layout.velocity.is_some() { points as u64 } else { 0 }, "velocities")?;
     let mut record = vec![0; 4 * layout.words];
     for index in 0..points {
         stream.read_exact(&mut record).map_err(broken)?;
         let words = record.as_chunks().0;
-        positions.push(DVec3::from_array([0, 1, 2].map(|axis| f32::from_be_bytes(words[axis]).into())));
+        let vector = |at: usize| DVec3::from_array([0, 1, 2].map(|axis| f32::from_be_bytes(words[at + axis]).into()));
+        positions.push(vector(0));
+        velocities.extend(layout.velocity.map(vector));
         if let Some(class) = layout.class {
             classes.push(source.class(i32::from_be_bytes(words[class]).into(), index)?);
         }
     }
-    Ok(ParticleFile { positions, classes: layout.class.map(|_| classes), ..ParticleFile::default() })
+    let (classes, velocities) = (layout.class.map(|_| classes), layout.velocity.map(|_| velocities));
+    Ok(ParticleFile { positions, classes, velocities, ..ParticleFile::default() })
 }
 
 /// Where a point's record has what.
 struct Layout {
     words: usize,
     class: Option<usize>,
+    velocity: Option<usize>,
 }
 
 impl Layout {
@@ -91,7 +96,7 @@ impl Layout {
         attributes: usize,
         broken: impl Fn(std::io::Error) -> ReadError,
     ) -> Result<Layout, ReadError> {
-        let mut layout = Layout { words: POSITION, class: None };
+        let mut layout = Layout { words: POSITION, class: None, velocity: None };
         for _ in 0..attributes {
             let name = text(stream).map_err(&broken)?;
             let size = usize::from(short(stream).map_err(&broken)?);
@@ -122,6 +127,14 @@ impl Layout {
                 if layout.class.replace(layout.words).is_some() {
                     return Err(source.malformed(At::Unknown, "attribute `class` is there twice"));
                 }
+            }
+            // FLOAT or VECTOR.
+            if is_velocity(&name)
+                && size == 3
+                && matches!(kind, 0 | 5)
+                && layout.velocity.replace(layout.words).is_some()
+            {
+                return Err(source.second_velocity(At::Unknown, &name));
             }
             layout.words += size;
             if layout.words > WORDS {

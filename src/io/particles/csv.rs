@@ -42,6 +42,8 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let (rows, some) = (text::line_count(content), |column: Option<usize>, n| if column.is_some() { n } else { 0 });
     let mut positions = source.room(rows, "positions")?;
     let mut classes: Vec<u8> = source.room(some(columns.class, rows), "classes")?;
+    let moving = if columns.velocity.is_some() { rows } else { 0 };
+    let mut velocities: Vec<DVec3> = source.room(moving, "velocities")?;
     let mut radii: Vec<f64> = source.room(some(columns.radius, rows), "radii")?;
     let mut check = CommaCheck::default();
     while more {
@@ -54,6 +56,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
         if let Some(column) = columns.class {
             classes.push(source.class(number(column)?, classes.len())?);
         }
+        if let Some([x, y, z]) = columns.velocity {
+            velocities.push(DVec3::new(number(x)?, number(y)?, number(z)?));
+        }
         if let Some(column) = columns.radius {
             radii.push(number(column)?);
         }
@@ -65,8 +70,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     if !has_header && delimiter == b',' {
         check.finish(source, first, columns.count)?;
     }
-    let classes = columns.class.map(|_| classes);
-    Ok(ParticleFile { positions, radius: source.length("radius", radii)?, classes, ..ParticleFile::default() })
+    let (classes, velocities) = (columns.class.map(|_| classes), columns.velocity.map(|_| velocities));
+    let radius = source.length("radius", radii)?;
+    Ok(ParticleFile { positions, radius, classes, velocities, ..ParticleFile::default() })
 }
 
 fn line(record: &StringRecord) -> At {
@@ -89,6 +95,7 @@ struct Columns {
     axes: [usize; 3],
     class: Option<usize>,
     radius: Option<usize>,
+    velocity: Option<[usize; 3]>,
     count: usize,
 }
 
@@ -96,7 +103,7 @@ impl Columns {
     fn first(source: &Source<'_>, record: &StringRecord) -> Result<Columns, ReadError> {
         match record.len() {
             0..3 => Err(Self::missing(source, record)),
-            count => Ok(Columns { axes: [0, 1, 2], class: None, radius: None, count }),
+            count => Ok(Columns { axes: [0, 1, 2], class: None, radius: None, velocity: None, count }),
         }
     }
 
@@ -106,63 +113,78 @@ impl Columns {
 
     /// `x`, `y` and `z` count; else the first names that are the same but for their axis, `px` or `Points:0` alike.
     fn named(source: &Source<'_>, header: &StringRecord) -> Result<Columns, ReadError> {
-        let names: Vec<Option<(String, usize, bool)>> = header.iter().map(axis).collect();
-        let place = |stem: &str, axis: usize, digits: bool| {
-            let same = |name: &Option<(String, usize, bool)>| {
-                name.as_ref().is_some_and(|name| (name.0.as_str(), name.1, name.2) == (stem, axis, digits))
-            };
-            names.iter().position(same).map(|first| (first, names[first + 1..].iter().any(same)))
-        };
-        // Few stems are known, so this is quick however long the header.
-        let mut stems: Vec<(&str, bool)> = Vec::new();
-        for (stem, _, digits) in names.iter().flatten() {
-            if !stems.contains(&(stem, *digits)) {
-                stems.push((stem, *digits));
-            }
-        }
-        stems.sort_by_key(|(stem, _)| !stem.is_empty());
-        let whole = stems.into_iter().find_map(|(stem, digits)| {
-            let found = [0, 1, 2].map(|axis| place(stem, axis, digits));
-            found.iter().all(Option::is_some).then(|| found.map(Option::unwrap_or_default))
-        });
-        let Some(axes) = whole else {
+        let Some(axes) = triple(header, &POSITIONS, true) else {
             return Err(Self::missing(source, header));
         };
+        let velocity = triple(header, &VELOCITIES, false);
         let one = |name: &str| {
             let mut places = header.iter().enumerate().filter(|(_, n)| n.eq_ignore_ascii_case(name)).map(|(i, _)| i);
             (places.next(), places.next().is_some())
         };
         let ((class, two_classes), (radius, two_radii)) = (one("class"), one("radius"));
-        let repeated = axes.iter().find(|(_, again)| *again).and_then(|(column, _)| header.get(*column));
+        let repeated = axes
+            .iter()
+            .chain(velocity.iter().flatten())
+            .find(|(_, again)| *again)
+            .and_then(|(column, _)| header.get(*column));
         let repeated = repeated.or(two_classes.then_some("class")).or(two_radii.then_some("radius"));
         if let Some(name) = repeated {
             let detail = format!("column `{}` is there twice", quote(name));
             return Err(source.malformed_but(line(header), detail, "remove or rename one of them"));
         }
-        Ok(Columns { axes: axes.map(|(column, _)| column), class, radius, count: header.len() })
+        let columns = |found: [(usize, bool); 3]| found.map(|(column, _)| column);
+        Ok(Columns { axes: columns(axes), class, radius, velocity: velocity.map(columns), count: header.len() })
     }
 }
 
-/// Whether a column named `name` holds positions along an axis: `x`, `Points:0`, `position_x`, `Pos.X`, `px` and the like.
-/// Its stem, the axis, and whether a digit names it.
-fn axis(name: &str) -> Option<(String, usize, bool)> {
-    const STEMS: [&str; 12] = [
-        "p",
-        "pos",
-        "position",
-        "positions",
-        "point",
-        "points",
-        "coord",
-        "coords",
-        "coordinate",
-        "coordinates",
-        "center",
-        "centre",
-    ];
+/// Stems of the names of columns that hold positions.
+const POSITIONS: [&str; 12] = [
+    "p",
+    "pos",
+    "position",
+    "positions",
+    "point",
+    "points",
+    "coord",
+    "coords",
+    "coordinate",
+    "coordinates",
+    "center",
+    "centre",
+];
+/// … and velocities.
+const VELOCITIES: [&str; 4] = ["v", "vel", "velocity", "velocities"];
+
+/// Three columns of vectors, and whether each is there once more: the first whose names are the same but for their axis; names
+/// that are nothing but an axis first, where they count.
+fn triple(header: &StringRecord, stems: &[&str], bare: bool) -> Option<[(usize, bool); 3]> {
+    let names: Vec<Option<(String, usize, bool)>> = header.iter().map(|name| axis(name, stems, bare)).collect();
+    let place = |stem: &str, axis: usize, digits: bool| {
+        let same = |name: &Option<(String, usize, bool)>| {
+            name.as_ref().is_some_and(|name| (name.0.as_str(), name.1, name.2) == (stem, axis, digits))
+        };
+        names.iter().position(same).map(|first| (first, names[first + 1..].iter().any(same)))
+    };
+    // Few stems are known, so this is quick however long the header.
+    let mut stems: Vec<(&str, bool)> = Vec::new();
+    for (stem, _, digits) in names.iter().flatten() {
+        if !stems.contains(&(stem, *digits)) {
+            stems.push((stem, *digits));
+        }
+    }
+    stems.sort_by_key(|(stem, _)| !stem.is_empty());
+    stems.into_iter().find_map(|(stem, digits)| {
+        let found = [0, 1, 2].map(|axis| place(stem, axis, digits));
+        found.iter().all(Option::is_some).then(|| found.map(Option::unwrap_or_default))
+    })
+}
+
+/// Whether a column named `name` holds vectors along an axis: `x` (where `bare` names count), `Points:0`, `position_x`, `Pos.X`,
+/// `px` and the like. Its stem, the axis, and whether a digit names it.
+fn axis(name: &str, stems: &[&str], bare: bool) -> Option<(String, usize, bool)> {
     let mut stem: String = name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
     let last = stem.pop()?;
     let (axis, digits) = "xyz".find(last).map(|i| (i, false)).or("012".find(last).map(|i| (i, true)))?;
-    let known = STEMS.contains(&stem.as_str()) || (stem.is_empty() && !digits);
+    let known = stems.contains(&stem.as_str()) || (bare && stem.is_empty() && !digits);
     known.then_some((stem, axis, digits))
 }

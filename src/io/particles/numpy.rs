@@ -57,8 +57,9 @@ pub(super) fn read_npz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     };
     let (radius, support) = (length("radius")?, length("support")?);
     let classes = entry(source, &mut archive, &names, "class", |array| array.classes(source))?;
+    let velocities = entry(source, &mut archive, &names, "velocity", |array| array.positions(source))?;
     let axes = entry(source, &mut archive, &names, "axes", |array| array.axes(source))?;
-    Ok(ParticleFile { positions, radius, support, classes, axes })
+    Ok(ParticleFile { positions, radius, support, classes, velocities, axes })
 }
 
 /// What `read` makes of the array `name`, if the archive has it. Nothing is unpacked that is not decoded at once.

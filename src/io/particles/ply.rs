@@ -10,7 +10,7 @@ use super::source::Source;
 use super::{At, ParticleFile, ReadError, text};
 use crate::io::quote::{list, quote};
 
-/// Reads x, y, z (any numeric type) and `class` of the element `vertex`; all other elements are walked over, so that data
+/// Reads x, y, z (any numeric type), vx, vy, vz and `class` of the element `vertex`; all other elements are walked over, so that data
 /// that do not end where the header says are noticed.
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let header = ply_header::read(source)?;
@@ -52,15 +52,22 @@ fn vertices(source: &Source<'_>, element: &Element, body: &mut Body<'_>) -> Resu
     let class = element.scalar("class");
     let mut positions = source.room(element.count, "positions")?;
     let mut classes = source.room(if class.is_some() { element.count } else { 0 }, "classes")?;
+    let velocity = match ["vx", "vy", "vz"].map(|axis| element.scalar(axis)) {
+        [Some(x), Some(y), Some(z)] => Some([x, y, z]),
+        _ => None,
+    };
+    let mut velocities = source.room(if velocity.is_some() { element.count } else { 0 }, "velocities")?;
     let mut values = vec![f64::NAN; element.properties.len()];
     for index in 0..element.count as usize {
         body.entry(source, &element.name, &element.properties, &mut values)?;
         positions.push(DVec3::new(values[x], values[y], values[z]));
+        velocities.extend(velocity.map(|columns| DVec3::from_array(columns.map(|column| values[column]))));
         if let Some(class) = class {
             classes.push(source.class(values[class], index)?);
         }
     }
-    Ok(ParticleFile { positions, classes: class.map(|_| classes), ..ParticleFile::default() })
+    let (classes, velocities) = (class.map(|_| classes), velocity.map(|_| velocities));
+    Ok(ParticleFile { positions, classes, velocities, ..ParticleFile::default() })
 }
 
 /// What follows the header.

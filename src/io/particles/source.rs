@@ -11,6 +11,12 @@ use crate::io::quote;
 /// A message's detail is cut after so many characters.
 const DETAIL: usize = 240;
 
+/// What arrays of velocities are called: three components for each particle. Anything else of such a name means something else,
+/// and is passed over.
+pub(super) fn is_velocity(name: &str) -> bool {
+    ["velocity", "Velocity", "velocities", "v", "U"].contains(&name)
+}
+
 /// A file's content, its path for error messages, and what reading it took so far.
 pub(super) struct Source<'a> {
     pub(super) path: &'a Path,
@@ -65,6 +71,12 @@ impl Source<'_> {
     /// Room for so many more positions, read number by number.
     pub(super) fn triples(&self, count: u64) -> Result<Triples, ReadError> {
         Ok(Triples { positions: self.room(count, "positions")?, open: [0.0; 3], filled: 0 })
+    }
+
+    /// Two arrays of velocities could be meant.
+    pub(super) fn second_velocity(&self, at: At, name: &str) -> ReadError {
+        let detail = format!("a second array of velocities, `{}`", quote::quote(name));
+        self.malformed_but(at, detail, "remove or rename one of them")
     }
 
     /// Checks the values of an array named `class`, which in a foreign file could mean anything.

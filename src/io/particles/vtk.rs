@@ -3,12 +3,12 @@
 use glam::DVec3;
 
 use super::numbers::Kind;
-use super::source::{Source, find};
+use super::source::{Source, find, is_velocity};
 use super::vtk_sections::{Sections, legacy};
 use super::{At, ParticleFile, ReadError};
 use crate::io::quote::quote;
 
-/// Reads POINTS and, where there is one, the point array `class`.
+/// Reads POINTS and, where they are there, the point array `class` and one of velocities.
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let bytes = source.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(source.bytes);
     let mut lines = bytes.splitn(4, |b| *b == b'\n');
@@ -32,6 +32,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
         data_set: String::new(),
         positions: None,
         classes: None,
+        velocities: None,
         after_points: false,
         of: Of::Set,
         tuples: 0,
@@ -53,6 +54,7 @@ struct Walk<'a> {
     data_set: String,
     positions: Option<Vec<DVec3>>,
     classes: Option<Vec<u8>>,
+    velocities: Option<Vec<DVec3>>,
     /// Whether POINTS came last.
     after_points: bool,
     of: Of,
@@ -75,7 +77,8 @@ impl Walk<'_> {
             let found = format!("data set `{}` without", quote(&self.data_set));
             return Err(self.sections.source.no_positions("POINTS expected", found));
         };
-        Ok(ParticleFile { positions, classes: self.classes, ..ParticleFile::default() })
+        let (classes, velocities) = (self.classes, self.velocities);
+        Ok(ParticleFile { positions, classes, velocities, ..ParticleFile::default() })
     }
 
     /// Reads or passes over the section that begins with `line`; `false` where it is unknown and so the last that is looked at.
@@ -137,7 +140,8 @@ impl Walk<'_> {
                 self.sections.skip(&keyword, "unsigned_char", tuples.saturating_mul(number(2)?))?;
             }
             "LOOKUP_TABLE" => self.sections.skip(&keyword, "unsigned_char", number(2)?.saturating_mul(4))?,
-            "VECTORS" | "NORMALS" => self.sections.skip(&keyword, &kind(2), tuples.saturating_mul(3))?,
+            "VECTORS" => self.array(words.get(1).copied().unwrap_or_default(), &kind(2), 3, tuples)?,
+            "NORMALS" => self.sections.skip(&keyword, &kind(2), tuples.saturating_mul(3))?,
             "TENSORS" => self.sections.skip(&keyword, &kind(2), tuples.saturating_mul(9))?,
             "TENSORS6" => self.sections.skip(&keyword, &kind(2), tuples.saturating_mul(6))?,
             "TEXTURE_COORDINATES" => self.sections.skip(&keyword, &kind(3), tuples.saturating_mul(number(2)?))?,
@@ -200,9 +204,14 @@ impl Walk<'_> {
         Ok(false)
     }
 
-    /// Reads the array if it is `class` of the points, or passes over it.
+    /// Reads the array if it is `class` or velocities of the points, or passes over it.
     fn array(&mut self, name: &str, kind: &str, components: u64, tuples: u64) -> Result<(), ReadError> {
         let count = components.saturating_mul(tuples);
+        // How long numbers of an unknown type are is not known.
+        let known = self.sections.ascii || legacy(kind).is_some();
+        if is_velocity(name) && self.of == Of::Points && components == 3 && known {
+            return self.velocities(name, kind, tuples);
+        }
         if name != "class" || self.of != Of::Points {
             return self.sections.skip(&format!("array `{}`", quote(name)), kind, count);
         }
@@ -227,6 +236,18 @@ impl Walk<'_> {
         })?;
         bad?;
         self.classes = Some(classes);
+        Ok(())
+    }
+
+    fn velocities(&mut self, name: &str, kind: &str, tuples: u64) -> Result<(), ReadError> {
+        let source = self.sections.source;
+        if self.velocities.is_some() {
+            return Err(source.second_velocity(self.sections.here(), name));
+        }
+        // As many as there are points, or refused later; never more than the file has bytes.
+        let mut velocities = source.triples(tuples.min(source.bytes.len() as u64))?;
+        self.sections.numbers(name, kind, tuples.saturating_mul(3), |v| velocities.push(v))?;
+        self.velocities = Some(velocities.finish());
         Ok(())
     }
 

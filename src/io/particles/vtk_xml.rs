@@ -8,12 +8,12 @@ use std::borrow::Cow;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use super::source::{Source, Triples, find};
+use super::source::{Source, Triples, find, is_velocity};
 use super::vtk_xml_data::{Array, Encoding};
 use super::{At, ParticleFile, ReadError};
 use crate::io::quote::quote;
 
-/// Reads the points and point array `class` of all pieces.
+/// Reads the points, the point array `class` and one of velocities of all pieces.
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     if !source.bytes.trim_ascii_end().ends_with(b"</VTKFile>") {
         return Err(source.malformed(At::Byte(source.bytes.len() as u64), "the file ends before `</VTKFile>`"));
@@ -62,12 +62,15 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
             }
             name @ (b"Points" | b"PointData") if !empty => section = name.to_vec(),
             b"DataArray" => {
-                let of_class = section == b"PointData" && attribute("Name")?.as_deref() == Some("class");
-                if !of_class && section != b"Points" {
-                    continue;
-                }
-                let (array, components) = if of_class { ("class", "1") } else { ("Points", "3") };
+                let name = attribute("Name")?.unwrap_or_default();
                 let stated = attribute("NumberOfComponents")?.unwrap_or_else(|| "1".into());
+                let what = match section.as_slice() {
+                    b"Points" => What::Positions,
+                    b"PointData" if name == "class" => What::Classes,
+                    b"PointData" if is_velocity(&name) && stated.trim() == "3" => What::Velocities,
+                    _ => continue,
+                };
+                let (array, components) = if what == What::Classes { ("class", "1") } else { ("Points", "3") };
                 if stated.trim() != components {
                     return Err(source.wrong_shape(array, format!("of {} components", quote(&stated)), components));
                 }
@@ -79,13 +82,13 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
                     data_type: data_type.unwrap_or_default(),
                     format: format.unwrap_or_default(),
                     offset: offset.unwrap_or(0),
-                    count: if of_class { pieces.points } else { pieces.points.saturating_mul(3) },
+                    count: if what == What::Classes { pieces.points } else { pieces.points.saturating_mul(3) },
                     text: text.trim_ascii(),
                 };
-                if of_class {
-                    pieces.classes(source, &array, &encoding)?;
-                } else {
-                    pieces.positions(source, &array, &encoding)?;
+                match what {
+                    What::Positions => pieces.positions(source, &array, &encoding)?,
+                    What::Classes => pieces.classes(source, &array, &encoding)?,
+                    What::Velocities => pieces.velocities(source, &name, &array, &encoding)?,
                 }
             }
             _ => {}
@@ -96,7 +99,16 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
         let found = format!("data set `{}` without", quote(&data_set));
         return Err(source.no_positions("a DataArray in Points expected", found));
     };
-    Ok(ParticleFile { positions: positions.finish(), classes: pieces.classes, ..ParticleFile::default() })
+    let (positions, velocities) = (positions.finish(), pieces.velocities.map(Triples::finish));
+    Ok(ParticleFile { positions, classes: pieces.classes, velocities, ..ParticleFile::default() })
+}
+
+/// What an array holds that is read.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum What {
+    Positions,
+    Classes,
+    Velocities,
 }
 
 /// The pieces of the data set so far: each brings its points once.
@@ -104,16 +116,19 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
 struct Pieces {
     positions: Option<Triples>,
     classes: Option<Vec<u8>>,
-    /// Points of the current piece, and whether they and their classes were read.
+    velocities: Option<Triples>,
+    /// Points of the current piece, and whether they, their classes and their velocities were read.
     points: usize,
     has_positions: bool,
     has_classes: bool,
+    has_velocities: bool,
 }
 
 impl Pieces {
     fn begin(&mut self, source: &Source<'_>, at: At, points: usize) -> Result<(), ReadError> {
         self.end(source, at)?;
-        (self.points, self.has_positions, self.has_classes) = (points, false, false);
+        self.points = points;
+        (self.has_positions, self.has_classes, self.has_velocities) = (false, false, false);
         Ok(())
     }
 
@@ -131,6 +146,22 @@ impl Pieces {
         }
         let more = source.triples(self.points as u64)?;
         let all = self.positions.get_or_insert(more);
+        all.reserve(self.points);
+        array.values(source, encoding, |v| all.push(v))
+    }
+
+    fn velocities(
+        &mut self,
+        source: &Source<'_>,
+        name: &str,
+        array: &Array<'_>,
+        encoding: &Encoding<'_>,
+    ) -> Result<(), ReadError> {
+        if std::mem::replace(&mut self.has_velocities, true) {
+            return Err(source.second_velocity(array.at, name));
+        }
+        let more = source.triples(self.points as u64)?;
+        let all = self.velocities.get_or_insert(more);
         all.reserve(self.points);
         array.values(source, encoding, |v| all.push(v))
     }
