@@ -120,10 +120,9 @@ struct Endured {
 
 fn settings(kind: &Kind) -> Settings {
     let optics = ["one", "two", "", "four"][kind.refractions as usize - 1];
-    let mut method = Method::default();
-    method.optics = Optics::named(optics).expect("one of three");
-    method.smooth = PlaneFit::default().iterations(kind.iterations).into();
-    method.into()
+    let optics = Optics::named(optics).expect("one of three");
+    let smooth = PlaneFit::default().iterations(kind.iterations).into();
+    Method { optics, smooth, ..Method::default() }.into()
 }
 
 fn run(gpu: &Gpu, kind: &Kind) -> Endured {

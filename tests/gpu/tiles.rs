@@ -19,7 +19,7 @@ fn ranges_equal_the_twin() {
         each_driver(|driver| {
             let shot = driver.shoot(&case);
             let maps: Vec<_> =
-                ["splash depth", "body depth (smoothed, even)"].iter().filter_map(|id| shot.floats(*id, 0)).collect();
+                ["splash depth", "body depth (smoothed, even)"].iter().filter_map(|id| shot.floats(id, 0)).collect();
             let maps: Vec<_> = maps.iter().map(Vec::as_slice).collect();
             let expected = tiles(size, &maps);
             let (low, high) =
