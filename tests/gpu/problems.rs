@@ -24,7 +24,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// gone through as liquid, (length found - length in droplet and slab) / gap: 1 where droplet and slab are fused, 0 where they
 /// are two. And how far off the direction is in which the ray goes on: medians over the pixels well within the droplet.
 fn fused(driver: &Driver, method: &str) -> [f64; 2] {
-    // Twelve radii apart: more than the filter's weights reach.
+    // About eleven radii apart: more than the filter's weights reach.
     let ball = sphere(Vec3::new(0.05, 0.02, 0.8), 0.1);
     let axes = Mat3::from_rotation_y(0.2) * Mat3::from_diagonal(Vec3::new(2.0, 2.0, 0.3));
     let body = Ellipsoid { center: Vec3::new(0.0, 0.0, -0.7), axes };
