@@ -140,12 +140,7 @@ fn settings(kind: &Kind) -> Settings {
     }
     let optics = ["one", "two", "", "four"][kind.refractions as usize - 1];
     let optics = Optics::named(optics).expect("one of three");
-<<<<<<< HEAD
     Method { optics, smooth: PlaneFit::default().iterations(kind.iterations).into(), ..Method::default() }.into()
-=======
-    let smooth = PlaneFit::default().iterations(kind.iterations).into();
-    Method { optics, smooth, ..Method::default() }.into()
->>>>>>> optics
 }
 
 fn run(gpu: &Gpu, kind: &Kind) -> Endured {
