@@ -2,7 +2,7 @@
 layout(set = 0, binding = 1, std430) readonly buffer PositionBlock { float at[]; } positions;
 layout(set = 0, binding = 2, std430) buffer ExtentBlock { uint at[]; } extent;
 layout(push_constant) uniform PushBlock { Prepare prepare; };
-// A constant and not a branch on prepare.entries_per_particle: see refract.frag on branches that only uniforms decide.
+// A constant and not a branch on prepare.entries_per_particle: see optics/walk.frag on branches that only uniforms decide.
 layout(constant_id = 0) const bool RELATION_TABLE = false; // the sort orders entries of the relation table, not particles
 
 const int FURTHEST_CELL = 1 << 29;

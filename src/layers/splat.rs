@@ -1,5 +1,5 @@
-//! Particles of a class and side, drawn as point sprites or quads (`glsl/splat.vert`); nearest front and farthest back of
-//! a class, ray-cast (`glsl/splat.frag`; Imai16 §4.2, Sigg06).
+//! Particles of a class and side, drawn as point sprites or quads (`glsl/layers/splat.vert`); nearest front and farthest back of
+//! a class, ray-cast (`glsl/layers/splat.frag`; Imai16 §4.2, Sigg06).
 
 use super::Surface;
 use crate::{

@@ -1,4 +1,4 @@
-//! The range of front depths in each tile (`glsl/tiles.comp`): lets rays outside the liquid skip what they pass by.
+//! The range of front depths in each tile (`glsl/optics/tiles.comp`): lets rays outside the liquid skip what they pass by.
 
 use crate::{
     layers::{Surface, Surfaces},

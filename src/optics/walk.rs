@@ -1,4 +1,4 @@
-//! The walk of each view ray through the liquid, and its colour (`glsl/refract.frag`; Imai16 §4.4, §4.5).
+//! The walk of each view ray through the liquid, and its colour (`glsl/optics/walk.frag`; Imai16 §4.4, §4.5).
 
 use super::{Fresnel, tiles};
 use crate::{
@@ -73,7 +73,7 @@ impl Walk {
                 rendering = rendering.and(plan.flat(name, Format::R32G32B32A32_SFLOAT), 0);
             }
         }
-        plan.render("refract", rendering, vec![(call, Vertices::Direct(3))]);
+        plan.render("walk", rendering, vec![(call, Vertices::Direct(3))]);
     }
 }
 

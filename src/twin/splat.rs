@@ -1,4 +1,4 @@
-//! Twin of `glsl/splat.vert` and `glsl/splat.frag`: nearest front or farthest back of a class of particles, one ray
+//! Twin of `glsl/layers/splat.vert` and `glsl/layers/splat.frag`: nearest front or farthest back of a class of particles, one ray
 //! cast for each particle and pixel (Imai16 §4.2, Sigg06).
 
 use super::quadric::{Quadric, pixel_ray, pixels_in, scale_offset, viewport};

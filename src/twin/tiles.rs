@@ -1,4 +1,4 @@
-//! Twin of `glsl/tiles.comp`: the range of front depths in each tile of the view.
+//! Twin of `glsl/optics/tiles.comp`: the range of front depths in each tile of the view.
 
 use crate::shader::FRONT_TILE;
 

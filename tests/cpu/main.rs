@@ -15,6 +15,6 @@ mod smooth;
 mod twin_normals;
 mod twin_optics;
 mod twin_plane_fit;
-mod twin_refract;
+mod twin_walk;
 #[cfg(feature = "io")]
 mod velocities;

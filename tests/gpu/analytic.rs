@@ -2,8 +2,8 @@
 //! computed here in double precision from the ellipsoids themselves.
 
 use crate::{
-    refract::degrees,
     support::{Case, Choose, Driver, Shot, each_driver, sphere},
+    walk::degrees,
 };
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use meniscus::{

@@ -4,8 +4,8 @@
 use crate::{
     analytic::{Quadric, SIZE, case, pixels, settings, snell, view, within},
     host::{self, with_renderer},
-    refract::degrees,
     support::{Choose, Driver, each_driver, random_cloud, sphere},
+    walk::degrees,
 };
 use ash::vk;
 use glam::{DVec3, Mat3, Vec3};
@@ -296,7 +296,7 @@ fn random_scenes_are_met_as_the_twin_meets_them() {
             let camera = crate::support::camera(Vec3::new(0.3, 0.4, 2.2), Vec3::ZERO, size);
             let case = crate::support::Case { particles, camera, settings, size, eye_inside: false };
             let painted = painted(size, blocks);
-            each_driver(|driver| crate::refract::compare_before(driver, &case, &painted, background));
+            each_driver(|driver| crate::walk::compare_before(driver, &case, &painted, background));
         }
     }
 }

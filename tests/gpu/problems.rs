@@ -2,8 +2,8 @@
 
 use crate::{
     analytic::{Quadric, SIZE, pixels, through, view},
-    refract::degrees,
     support::{Case, Driver, Shot, each_driver, sphere},
+    walk::degrees,
 };
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{Ellipsoid, Method, Particles, Settings, shader::SIDE_FRONT, twin::normal::decode_normal};

@@ -13,8 +13,8 @@ use meniscus::{
     twin::{
         background::env_color,
         normal::encode_normal,
-        refract::{Walk, walk},
         search::{Map, Maps},
+        walk::{Walk, walk},
     },
 };
 

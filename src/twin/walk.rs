@@ -1,4 +1,4 @@
-//! Twin of `glsl/refract.frag`: the walk of one view ray through up to two volumes of liquid, and the light it brings
+//! Twin of `glsl/optics/walk.frag`: the walk of one view ray through up to two volumes of liquid, and the light it brings
 //! back (Imai16 §4.4, §4.5, eqs. 6 to 9), total internal reflection followed inside, up to the host's scene.
 
 use super::{

@@ -13,8 +13,8 @@ use meniscus::{
     },
     twin::{
         background::Scene,
-        refract::{Walk, walk},
         search::{Map, Maps},
+        walk::{Walk, walk},
     },
 };
 use rayon::prelude::*;
