@@ -83,12 +83,18 @@ fn shader(compiler: &shaderc::Compiler, file: &str, source: &str, macros: &[&str
         |b: &reflect::Binding| format!("Binding {{ index: {}, name: {:?}, kind: Kind::{} }}", b.index, b.name, b.kind);
     let bindings: Vec<_> = found.bindings.iter().map(binding).collect();
     let name = if macros.is_empty() { file.to_owned() } else { format!("{file} ({})", macros.join(", ")) };
+    let scalar = |of: &str| if of.is_empty() { "None".to_owned() } else { format!("Some(Scalar::{of})") };
+    let list = |all: Vec<String>| format!("&[{}]", all.join(", "));
+    let constant = |(id, name, of): &(u32, String, &str)| format!("({id}, {name:?}, {})", scalar(of));
+    let member = |(name, offset, of): &(String, u32, &str)| format!("({name:?}, {offset}, {})", scalar(of));
     format!(
-        "Shader {{ name: {name:?}, spirv: &{words:?}, bindings: &[{}], constants: &{:?}, push: &{:?}, push_bytes: {} }}",
+        "Shader {{ name: {name:?}, spirv: &{words:?}, bindings: &[{}], constants: {}, push: {}, push_bytes: {}, \
+         outputs: {} }}",
         bindings.join(", "),
-        found.constants,
-        found.push,
-        found.push_bytes
+        list(found.constants.iter().map(constant).collect()),
+        list(found.push.iter().map(member).collect()),
+        found.push_bytes,
+        list(found.outputs.iter().map(|(location, of)| format!("({location}, {})", scalar(of))).collect()),
     )
 }
 

@@ -1,4 +1,5 @@
-//! What a SPIR-V module asks of its pipeline: bindings of set 0, specialisation constants and push constants, all by name.
+//! What a SPIR-V module asks of its pipeline: bindings of set 0, specialisation constants and push constants, all by name,
+//! and what it writes to colour attachments.
 
 use std::collections::HashMap;
 
@@ -12,10 +13,12 @@ pub struct Binding {
 #[derive(Default)]
 pub struct Interface {
     pub bindings: Vec<Binding>,
-    /// Constant id and name.
-    pub constants: Vec<(u32, String)>,
-    /// Name and byte offset of each member of the push-constant block.
-    pub push: Vec<(String, u32)>,
+    /// Id, name and type (variant of the library's `Scalar`) of each specialisation constant.
+    pub constants: Vec<(u32, String, &'static str)>,
+    /// Name, byte offset and type of each member of the push-constant block; the type of what is no scalar is empty.
+    pub push: Vec<(String, u32, &'static str)>,
+    /// Location and type of each output of a fragment shader.
+    pub outputs: Vec<(u32, &'static str)>,
     /// Size of that block in bytes.
     pub push_bytes: u32,
 }
@@ -23,6 +26,8 @@ pub struct Interface {
 // SPIR-V 1.6, section 3: the instructions, decorations and storage classes that matter here.
 const OP_NAME: u32 = 5;
 const OP_MEMBER_NAME: u32 = 6;
+const OP_ENTRY_POINT: u32 = 15;
+const OP_TYPE_BOOL: u32 = 20;
 const OP_TYPE_INT: u32 = 21;
 const OP_TYPE_FLOAT: u32 = 22;
 const OP_TYPE_VECTOR: u32 = 23;
@@ -31,26 +36,37 @@ const OP_TYPE_IMAGE: u32 = 25;
 const OP_TYPE_SAMPLER: u32 = 26;
 const OP_TYPE_STRUCT: u32 = 30;
 const OP_TYPE_POINTER: u32 = 32;
+const OP_SPEC_CONSTANT_TRUE: u32 = 48;
+const OP_SPEC_CONSTANT_FALSE: u32 = 49;
+const OP_SPEC_CONSTANT: u32 = 50;
 const OP_SPEC_CONSTANT_COMPOSITE: u32 = 51;
 const OP_VARIABLE: u32 = 59;
 const OP_DECORATE: u32 = 71;
 const OP_MEMBER_DECORATE: u32 = 72;
 const DECORATION_SPEC_ID: u32 = 1;
 const DECORATION_BUILT_IN: u32 = 11;
+const DECORATION_LOCATION: u32 = 30;
 const DECORATION_BINDING: u32 = 33;
 const DECORATION_SET: u32 = 34;
 const DECORATION_OFFSET: u32 = 35;
 const BUILT_IN_WORKGROUP_SIZE: u32 = 25;
 const UNIFORM_CONSTANT: u32 = 0;
 const UNIFORM: u32 = 2;
+const OUTPUT: u32 = 3;
 const PUSH_CONSTANT: u32 = 9;
 const STORAGE_BUFFER: u32 = 12;
 const DIM_CUBE: u32 = 3;
+const FRAGMENT: u32 = 4;
+
+/// Image formats of storage images that passes use.
+const FORMATS: [(u32, &str); 3] = [(3, "R32_SFLOAT"), (6, "R32G32_SFLOAT"), (33, "R32_UINT")];
 
 enum Type {
-    /// Bytes.
-    Scalar(u32),
+    /// Bytes of a float or a signed integer.
+    Float(u32),
+    Int,
     Uint,
+    Bool,
     /// Component type or column type, and how many.
     Vector(u32, u32),
     Image(String),
@@ -69,7 +85,8 @@ struct Module {
 
 pub fn interface(words: &[u32]) -> Result<Interface, String> {
     let mut m = Module::default();
-    let (mut binding_of, mut spec_of) = (HashMap::new(), HashMap::new());
+    let (mut binding_of, mut spec_of, mut location_of) = (HashMap::new(), HashMap::new(), HashMap::new());
+    let (mut typed, mut fragment) = (HashMap::new(), false);
     let (mut variables, mut group_size, mut composites) = (Vec::new(), None, HashMap::new());
     let mut at = 5; // past the header
     while at < words.len() {
@@ -78,6 +95,8 @@ pub fn interface(words: &[u32]) -> Result<Interface, String> {
         match op {
             OP_NAME => drop(m.names.insert(args[0], text(&args[1..]))),
             OP_MEMBER_NAME => drop(m.member_names.insert((args[0], args[1]), text(&args[2..]))),
+            OP_ENTRY_POINT => fragment = args[0] == FRAGMENT,
+            OP_DECORATE if args[1] == DECORATION_LOCATION => drop(location_of.insert(args[0], args[2])),
             OP_DECORATE if args[1] == DECORATION_BINDING => drop(binding_of.insert(args[0], args[2])),
             OP_DECORATE if args[1] == DECORATION_SPEC_ID => drop(spec_of.insert(args[0], args[2])),
             OP_DECORATE if args[1] == DECORATION_BUILT_IN && args[2] == BUILT_IN_WORKGROUP_SIZE => {
@@ -89,18 +108,27 @@ pub fn interface(words: &[u32]) -> Result<Interface, String> {
             OP_MEMBER_DECORATE if args[2] == DECORATION_OFFSET => {
                 m.member_offsets.insert((args[0], args[1]), args[3]);
             }
-            OP_TYPE_INT => drop(m.types.insert(args[0], if args[2] == 0 { Type::Uint } else { Type::Scalar(4) })),
-            OP_TYPE_FLOAT => drop(m.types.insert(args[0], Type::Scalar(args[1] / 8))),
+            OP_TYPE_BOOL => drop(m.types.insert(args[0], Type::Bool)),
+            OP_TYPE_INT => drop(m.types.insert(args[0], if args[2] == 0 { Type::Uint } else { Type::Int })),
+            OP_TYPE_FLOAT => drop(m.types.insert(args[0], Type::Float(args[1] / 8))),
             OP_TYPE_VECTOR | OP_TYPE_MATRIX => drop(m.types.insert(args[0], Type::Vector(args[1], args[2]))),
             OP_TYPE_IMAGE => {
                 let uint = matches!(m.types.get(&args[1]), Some(Type::Uint));
                 let (kind, cube) = (if args[6] == 2 { "StorageImage" } else { "SampledImage" }, args[2] == DIM_CUBE);
                 let texels = format!("Texels {{ uint: {uint}, array: {}, cube: {cube} }}", args[4] == 1);
-                m.types.insert(args[0], Type::Image(format!("{kind}({texels})")));
+                let format = match FORMATS.iter().find(|f| f.0 == args[7]) {
+                    Some((_, name)) => format!(", ash::vk::Format::{name}"),
+                    None if kind == "StorageImage" => {
+                        return Err(format!("storage images of format {} are not known", args[7]));
+                    }
+                    None => String::new(),
+                };
+                m.types.insert(args[0], Type::Image(format!("{kind}({texels}{format})")));
             }
             OP_TYPE_SAMPLER => drop(m.types.insert(args[0], Type::Sampler)),
             OP_TYPE_STRUCT => drop(m.types.insert(args[0], Type::Struct(args[1..].to_vec()))),
             OP_TYPE_POINTER => drop(m.types.insert(args[0], Type::Pointer(args[2]))),
+            OP_SPEC_CONSTANT_TRUE | OP_SPEC_CONSTANT_FALSE | OP_SPEC_CONSTANT => drop(typed.insert(args[1], args[0])),
             OP_SPEC_CONSTANT_COMPOSITE => drop(composites.insert(args[1], args[2..].to_vec())),
             OP_VARIABLE => variables.push((args[0], args[1], args[2])),
             _ => {}
@@ -117,13 +145,17 @@ pub fn interface(words: &[u32]) -> Result<Interface, String> {
     }
     let mut found = Interface::default();
     for (id, spec) in spec_of {
-        found.constants.push((spec, m.names.get(&id).cloned().unwrap_or_default()));
+        let of = typed.get(&id).map_or("", |of| m.scalar(*of));
+        found.constants.push((spec, m.names.get(&id).cloned().unwrap_or_default(), of));
     }
     for (pointer, variable, storage) in variables {
         let Some(Type::Pointer(pointee)) = m.types.get(&pointer) else { continue };
         if storage == PUSH_CONSTANT {
             found.push_bytes = m.bytes(*pointee);
             found.push = m.members(*pointee);
+        }
+        if let Some(location) = location_of.get(&variable).filter(|_| fragment && storage == OUTPUT) {
+            found.outputs.push((*location, m.component(*pointee)));
         }
         let Some(&index) = binding_of.get(&variable) else { continue };
         let kind = match (storage, m.types.get(pointee)) {
@@ -140,6 +172,7 @@ pub fn interface(words: &[u32]) -> Result<Interface, String> {
     }
     found.bindings.sort_by_key(|b| b.index);
     found.constants.sort();
+    found.outputs.sort();
     Ok(found)
 }
 
@@ -152,8 +185,8 @@ impl Module {
     /// Size of a type as far as it is fixed, std140 and std430 alike.
     fn bytes(&self, id: u32) -> u32 {
         match self.types.get(&id) {
-            Some(Type::Scalar(bytes)) => *bytes,
-            Some(Type::Uint) => 4,
+            Some(Type::Float(bytes)) => *bytes,
+            Some(Type::Int | Type::Uint) => 4,
             // Columns of a matrix are four floats here.
             Some(Type::Vector(of, count)) => count * self.bytes(*of),
             Some(Type::Struct(members)) => {
@@ -164,9 +197,29 @@ impl Module {
         }
     }
 
-    fn members(&self, id: u32) -> Vec<(String, u32)> {
+    fn members(&self, id: u32) -> Vec<(String, u32, &'static str)> {
         let Some(Type::Struct(members)) = self.types.get(&id) else { return Vec::new() };
         let name = |i| self.member_names.get(&(id, i)).cloned().unwrap_or_default();
-        (0..members.len() as u32).map(|i| (name(i), self.member_offsets.get(&(id, i)).copied().unwrap_or(0))).collect()
+        let offset = |i| self.member_offsets.get(&(id, i)).copied().unwrap_or(0);
+        (0u32..).zip(members).map(|(i, of)| (name(i), offset(i), self.scalar(*of))).collect()
+    }
+
+    /// The library's name of a scalar type; empty for any other.
+    fn scalar(&self, id: u32) -> &'static str {
+        match self.types.get(&id) {
+            Some(Type::Float(4)) => "Float",
+            Some(Type::Int) => "Int",
+            Some(Type::Uint) => "Uint",
+            Some(Type::Bool) => "Bool",
+            _ => "",
+        }
+    }
+
+    /// The same of a vector's components.
+    fn component(&self, id: u32) -> &'static str {
+        match self.types.get(&id) {
+            Some(Type::Vector(of, _)) => self.scalar(*of),
+            _ => self.scalar(id),
+        }
     }
 }

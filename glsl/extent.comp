@@ -69,7 +69,7 @@ void main() {
     }
     uint passes = (bits + DIGIT_BITS - 1u) / DIGIT_BITS;
     extent.at[EXTENT_PASSES] = passes;
-    uint groups = blocks(), rows = max((groups + 65534u) / 65535u, 1u);
+    uint groups = blocks(), rows = max((groups + MOST_GROUPS - 1u) / MOST_GROUPS, 1u);
     for (uint p = 0u; p < SORT_PASSES; ++p) {
         uint at = EXTENT_DISPATCH + 6u * p, on = p < passes ? 1u : 0u;
         extent.at[at] = on * ((groups + rows - 1u) / rows);

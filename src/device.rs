@@ -159,16 +159,20 @@ impl Host {
         }
     }
 
-    /// Checks that a format can be a colour attachment.
-    pub(crate) fn check_attachment(&self, format: vk::Format) -> Result<(), Error> {
+    /// Checks that a format can be a colour attachment, with blending if that is asked for.
+    pub(crate) fn check_attachment(&self, format: vk::Format, blends: bool) -> Result<(), Error> {
         // SAFETY: `Host` promises a live instance and a physical device of it.
         let p = unsafe { self.instance.get_physical_device_format_properties(self.physical_device, format) };
-        if p.optimal_tiling_features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT) {
+        let (wanted, what) = match blends {
+            true => (vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND, "as blended colour attachment"),
+            false => (vk::FormatFeatureFlags::COLOR_ATTACHMENT, "as colour attachment"),
+        };
+        if p.optimal_tiling_features.contains(wanted) {
             return Ok(());
         }
         // SAFETY: as above.
         let properties = unsafe { self.instance.get_physical_device_properties(self.physical_device) };
-        Err(Error::Unsupported { device: name(&properties), missing: format!("{format:?} as colour attachment") })
+        Err(Error::Unsupported { device: name(&properties), missing: format!("{format:?} {what}") })
     }
 
     /// Gives an object a debug name: "meniscus <role>".

@@ -120,9 +120,9 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// What the optics ask of the layers.
+    /// What smoothing and optics ask of the layers.
     pub fn asks(&self) -> Offers {
-        self.settings.method.optics.member().asks()
+        self.settings.method.asks()
     }
 
     /// At what scale of the picture surfaces are drawn and smoothed.

@@ -49,6 +49,17 @@ impl Offers {
     fn all(self) -> [bool; 5] {
         [self.backs, self.normals, self.thickness, self.half, self.speeds]
     }
+
+    /// What either of two asks for.
+    fn or(self, b: Offers) -> Offers {
+        Offers {
+            backs: self.backs || b.backs,
+            normals: self.normals || b.normals,
+            thickness: self.thickness || b.thickness,
+            half: self.half || b.half,
+            speeds: self.speeds || b.speeds,
+        }
+    }
 }
 
 impl Method {
@@ -77,6 +88,11 @@ impl Method {
             }
         }
         Ok(())
+    }
+
+    /// What smoothing and optics ask of the layers.
+    pub(crate) fn asks(&self) -> Offers {
+        self.smooth.member().asks().or(self.optics.member().asks())
     }
 
     /// The families, by the names of their fields.

@@ -105,6 +105,10 @@ impl Drop for Module<'_> {
 
 impl Pipeline {
     fn new(host: &Host, recipe: &Recipe) -> Result<Pipeline, Error> {
+        // Not every device blends every float format: layers that need it are refused on those.
+        for (format, blend) in &recipe.colors {
+            host.check_attachment(*format, *blend != Blend::Replace)?;
+        }
         let modules: Result<Vec<_>, _> = recipe.shaders.iter().map(|s| Module::new(host, s)).collect();
         let modules = modules?;
         let mut pipeline = Self::layouts(host, recipe)?;

@@ -211,7 +211,7 @@ impl Recorder<'_> {
         let (mut image_infos, mut buffer_infos) = (Vec::new(), Vec::new());
         for (b, target, access) in &call.bound {
             match b.kind {
-                Kind::SampledImage(_) | Kind::StorageImage(_) => {
+                Kind::SampledImage(_) | Kind::StorageImage(..) => {
                     let (view, layout) = self.view(*target, *access)?;
                     image_infos.push((b, [vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)]));
                 }

@@ -96,7 +96,7 @@ impl Renderer {
             let remedy = "use an RGBA float, UNORM or sRGB format";
             return Err(Error::parameter("output format", format!("{output:?}"), remedy));
         }
-        host.check_attachment(output)?;
+        host.check_attachment(output, false)?;
         if !(1..=MOST_SLOTS).contains(&host.frames_in_flight) {
             let remedy = format!("use 1 to {MOST_SLOTS}");
             return Err(Error::parameter("frames in flight", host.frames_in_flight, remedy));

@@ -10,12 +10,24 @@ pub struct Shader {
     pub spirv: &'static [u32],
     /// Bindings of set 0, by index.
     pub bindings: &'static [Binding],
-    /// Id and name of each specialisation constant, four bytes all.
-    pub constants: &'static [(u32, &'static str)],
-    /// Name and byte offset of each member of the push-constant block.
-    pub push: &'static [(&'static str, u32)],
+    /// Id, name and type of each specialisation constant, four bytes all.
+    pub constants: &'static [(u32, &'static str, Option<Scalar>)],
+    /// Name, byte offset and type of each member of the push-constant block; `None` for what is no scalar.
+    pub push: &'static [(&'static str, u32, Option<Scalar>)],
     /// Bytes of that block.
     pub push_bytes: u32,
+    /// Location and type of what a fragment shader writes to each colour attachment.
+    pub outputs: &'static [(u32, Option<Scalar>)],
+}
+
+/// Types of four bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)] // they are GLSL's
+pub enum Scalar {
+    Float,
+    Int,
+    Uint,
+    Bool,
 }
 
 /// One binding of a shader.
@@ -34,8 +46,8 @@ pub struct Binding {
 pub enum Kind {
     /// `texture…` without a sampler.
     SampledImage(Texels),
-    /// `image…`.
-    StorageImage(Texels),
+    /// `image…`, and the format that the shader says.
+    StorageImage(Texels, ash::vk::Format),
     /// `uniform … {}` of so many bytes.
     UniformBuffer(u32),
     /// `buffer … {}`.
@@ -60,7 +72,7 @@ impl Kind {
         use ash::vk::DescriptorType as T;
         match self {
             Kind::SampledImage(_) => T::SAMPLED_IMAGE,
-            Kind::StorageImage(_) => T::STORAGE_IMAGE,
+            Kind::StorageImage(..) => T::STORAGE_IMAGE,
             Kind::UniformBuffer(_) => T::UNIFORM_BUFFER,
             Kind::StorageBuffer => T::STORAGE_BUFFER,
             Kind::Sampler => T::SAMPLER,
@@ -71,7 +83,7 @@ impl Kind {
 /// Generated code; the constants are documented where they are written, in `glsl/include/shared.glsl`.
 #[allow(missing_docs, clippy::unreadable_literal, clippy::excessive_precision)]
 mod generated {
-    use super::{Binding, Kind, Shader, Texels};
+    use super::{Binding, Kind, Scalar, Shader, Texels};
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 }
 pub use generated::*;

@@ -1,4 +1,4 @@
-// The depth map that a smoothing filter reads: linear depth in particle radii, layer 0 the nearest fronts, layer 1 the
+// The depth map that is smoothed, or whose normals are made: linear depth in particle radii, layer 0 the nearest fronts, layer 1 the
 // farthest backs. 0: no surface. Negative: the eye is inside.
 layout(set = 0, binding = 1) uniform texture2DArray depth_in;
 

@@ -5,8 +5,6 @@ layout(push_constant) uniform PushBlock { Prepare prepare; };
 // A constant and not a branch on prepare.entries_per_particle: see optics/walk.frag on branches that only uniforms decide.
 layout(constant_id = 0) const bool RELATION_TABLE = false; // the sort orders entries of the relation table, not particles
 
-const int FURTHEST_CELL = 1 << 29;
-
 vec3 position(uint i) {
     uint at = prepare.first_word + i * prepare.word_stride;
     return prepare.unit_scale * vec3(positions.at[at], positions.at[at + 1u], positions.at[at + 2u]);

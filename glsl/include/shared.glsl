@@ -196,6 +196,12 @@ struct Draws {
     uint quad_first_instance;
 };
 
+// Groups of one dispatch on each axis: what Vulkan guarantees of maxComputeWorkGroupCount.
+#define MOST_GROUPS 65535
+// Cells of device-prepared particles are counted to either side of the origin up to this one; what lies further out is taken
+// to lie there.
+#define FURTHEST_CELL 536870912
+
 // Push constants of the preparation. Lengths are world units times a power of two that brings the radius into 1..2: that
 // rounds nothing, and squares of lengths stay within float32 at any scale.
 struct Prepare {
@@ -220,6 +226,12 @@ struct Prepare {
     uint has_last_classes;     // 1 if the last frame left classes
     uint cells_around;         // cells to either side of a particle's own that hold neighbours
 };
+
+// How a look-up is moved: by the normal times T; to where the bent ray's direction vanishes, with an index that grows with T;
+// by the bent ray's lateral components.
+#define LOOKUP_NORMAL 0
+#define LOOKUP_INDEX 1
+#define LOOKUP_BENT 2
 
 // Push constants of the splat pass.
 struct Splat {

@@ -1,9 +1,9 @@
 // The front surface at a pixel of the picture, from maps of half its width and height (Cords08 section 5): bilinear, by hand,
-// between pixels of one surface. Where some of the four have none, the rest make it up, and the share of those covers it.
+// between pixels of one surface. Where some of the four have none, the rest make it up, and the weight of those is how much it covers.
 struct Front {
     float depth;    // 0: no surface; negative: the near plane lies inside a particle
     vec3 normal;
-    float coverage; // share of the four that have a surface, by their weights
+    float coverage; // weight of those of the four that have a surface
     float speed;    // of the same pixels as the depth; 0 without a velocity map
 };
 
@@ -18,8 +18,8 @@ Front upsampled(vec2 position) {
         ivec2 step = ivec2(k & 1, k >> 1);
         at[k] = clamp(ivec2(corner) + step, ivec2(0), last);
         depth[k] = texelFetch(body_depth, ivec3(at[k], SIDE_FRONT), 0).x;
-        vec2 share = mix(1.0 - f, f, vec2(step));
-        weight[k] = share.x * share.y;
+        vec2 factors = mix(1.0 - f, f, vec2(step));
+        weight[k] = factors.x * factors.y;
         if (depth[k] == 0.0) continue;
         coverage += weight[k];
         if (weight[k] > most) {

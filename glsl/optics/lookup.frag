@@ -30,17 +30,13 @@ layout(push_constant) uniform PushBlock {
     float diffuse;           // fraction of white that is scattered
     float specular;          // of the light's mirror image
     float shininess;         // its exponent
-    float spray;             // share of white at the speed after it, and above
+    float spray;             // fraction of white at the speed after it, and above
     float spray_speed;
 } push;
 layout(location = 0) out vec4 out_color;
 #include "environment.glsl"
 #include "scene.glsl"
 #include "upsample.glsl"
-
-const uint SSFR = 0u;       // the normal, times T, is the offset
-const uint SSFR_INDEX = 1u; // where the bent ray's direction vanishes, with an index that grows with T
-const uint CORDS = 2u;      // the bent ray's lateral components are the offset
 
 // What lies behind the liquid at a position of the picture, as far as the picture reaches.
 vec3 seen_at(vec2 p) {
@@ -58,24 +54,65 @@ vec3 seen_at(vec2 p) {
 vec3 seen_beside(vec2 offset) { return seen_at(gl_FragCoord.xy + offset * sign(frame.pixel_scale) * frame.size); }
 
 vec3 refracted(vec3 dir, vec3 n, float t_weight) {
-    if (MODE == SSFR) return seen_beside(push.strength * t_weight * n.xy);
-    if (MODE == CORDS) return seen_beside(push.strength * refract(dir, n, 1.0 / frame.ior).xy);
+    if (MODE == LOOKUP_NORMAL) return seen_beside(push.strength * t_weight * n.xy);
+    if (MODE == LOOKUP_BENT) return seen_beside(push.strength * refract(dir, n, 1.0 / frame.ior).xy);
     // Im16 fig. 5 prints "refract(...).xy - E.z"; what it must mean is the perspective division.
     vec3 bent = refract(dir, n, mix(frame.ior, 1.0, t_weight) / frame.ior);
     return bent.z < 0.0 ? seen_at(project(bent)) : infinitely_far(bent);
 }
 
-void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec3 v = view_ray(gl_FragCoord.xy), dir = normalize(v);
+// The surface at a pixel.
+Front front_at(ivec2 pixel) {
     Front front;
     if (HALF_RESOLUTION) {
         front = upsampled(gl_FragCoord.xy);
         // Over the host's picture a pixel is the liquid's or not.
         if (HOST_BACKGROUND && front.coverage < 0.5) front.depth = 0.0;
-    } else {
-        front.depth = texelFetch(body_depth, ivec3(pixel, SIDE_FRONT), 0).x;
+        return front;
     }
+    front.depth = texelFetch(body_depth, ivec3(pixel, SIDE_FRONT), 0).x;
+    front.normal = decode_normal(texelFetch(body_normal, ivec3(pixel, SIDE_FRONT), 0).x);
+    front.coverage = 1.0;
+    front.speed = 0.0;
+#ifdef SPEED
+    front.speed = texelFetch(speed, pixel, 0).x;
+#endif
+    return front;
+}
+
+float thickness_at(ivec2 pixel) {
+#ifdef THICKNESS
+    return texelFetch(thickness, pixel, 0).x;
+#else
+    return 0.0;
+#endif
+}
+
+// White light from far away, by Phong.
+float phong(vec3 dir, vec3 n) {
+    vec3 light = vec3(push.light_x, push.light_y, push.light_z);
+    float facing = dot(light, n), mirror = max(dot(reflect(dir, n), light), 0.0);
+    float lit = push.diffuse * max(facing, 0.0);
+    return facing > 0.0 && mirror > 0.0 ? lit + push.specular * exp(push.shininess * log(mirror)) : lit;
+}
+
+// What the surface adds to the light through it: reflection, and for Instant Liquids highlights and spray.
+vec3 shaded(vec3 color, vec3 dir, vec3 n, Front front) {
+    vec3 bent = refract(dir, n, 1.0 / frame.ior);
+    float reflectance = fresnel(-dot(dir, n), -dot(bent, n), frame.ior, EXACT_FRESNEL);
+    color = mix(color, infinitely_far(reflect(dir, n)), reflectance);
+    if (MODE == LOOKUP_BENT) color += phong(dir, n);
+#ifdef SPEED
+    // Spray: shifted to white by the velocity map (Cords08 section 4).
+    color = mix(color, vec3(1.0), push.spray * min(front.speed / push.spray_speed, 1.0));
+#endif
+    return color;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec3 v = view_ray(gl_FragCoord.xy), dir = normalize(v);
+    Front front = front_at(pixel);
     float depth = front.depth;
     bool inside = depth < 0.0; // a particle around the near plane: nothing to bend at
     if (depth == 0.0 || scene_hides(pixel, inside ? frame.near : depth)) {
@@ -84,33 +121,13 @@ void main() {
         out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
         return;
     }
-    vec3 n = HALF_RESOLUTION ? front.normal : decode_normal(texelFetch(body_normal, ivec3(pixel, SIDE_FRONT), 0).x);
-    if (inside) n = -dir;
+    vec3 n = inside ? -dir : front.normal;
     if (dot(dir, n) > 0.0) n = -n;
-    float length_inside = 0.0;
-#ifdef THICKNESS
-    length_inside = texelFetch(thickness, pixel, 0).x;
-#endif
+    float length_inside = thickness_at(pixel);
     float t_weight = 1.0 - exp(-push.thickness_scale * length_inside);
     vec3 color = inside ? seen_at(gl_FragCoord.xy) : refracted(dir, n, t_weight);
     color *= exp(-frame.absorption * length_inside);
-    if (!inside) {
-        vec3 bent = refract(dir, n, 1.0 / frame.ior);
-        float reflectance = fresnel(-dot(dir, n), -dot(bent, n), frame.ior, EXACT_FRESNEL);
-        color = mix(color, infinitely_far(reflect(dir, n)), reflectance);
-        if (MODE == CORDS) {
-            // Phong: white light from far away.
-            vec3 light = vec3(push.light_x, push.light_y, push.light_z);
-            float facing = dot(light, n), mirror = max(dot(reflect(dir, n), light), 0.0);
-            color += push.diffuse * max(facing, 0.0);
-            if (facing > 0.0 && mirror > 0.0) color += push.specular * exp(push.shininess * log(mirror));
-        }
-#ifdef SPEED
-        // Spray: shifted to white by the velocity map (Cords08 section 4).
-        float fast = HALF_RESOLUTION ? front.speed : texelFetch(speed, pixel, 0).x;
-        color = mix(color, vec3(1.0), push.spray * min(fast / push.spray_speed, 1.0));
-#endif
-    }
+    if (!inside) color = shaded(color, dir, n, front);
     // The liquid's edge runs between the maps' pixels.
     if (HALF_RESOLUTION && !HOST_BACKGROUND && front.coverage < 1.0) color = mix(behind(pixel, dir), color, front.coverage);
     out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);

@@ -7,19 +7,14 @@
 #include "shared.glsl"
 #include "frame.glsl"
 #include "normal.glsl"
+#include "depth_map.glsl"
 layout(local_size_x = IMAGE_GROUP, local_size_y = IMAGE_GROUP) in;
-layout(set = 0, binding = 1) uniform texture2DArray depth_in;
 #ifdef RAW
 layout(set = 0, binding = 2) uniform utexture2DArray normal_raw; // where differences say nothing
 #endif
 layout(set = 0, binding = 3, r32ui) uniform writeonly uimage2DArray normal_out;
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 layout(constant_id = 0) const uint COUNTERS = 0; // slot of its first counter
-
-float depth_at(ivec2 p, int layer) {
-    if (any(lessThan(p, ivec2(0))) || any(greaterThanEqual(p, ivec2(frame.size)))) return 0.0;
-    return texelFetch(depth_in, ivec3(p, layer), 0).x;
-}
 
 // Difference of positions along one pixel step, from the side with the smaller jump; zero if neither side has a surface.
 vec3 tangent(ivec2 pixel, ivec2 step, int layer, float d, vec3 v) {

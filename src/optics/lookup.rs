@@ -10,7 +10,7 @@ use crate::{
     input::{Background, EnvironmentShape},
     layers::Surfaces,
     plan::{Call, External, Plan, Rendering, Vertices},
-    shader::{LOOKUP_FRAG, VIEW_VERT},
+    shader::{LOOKUP_BENT, LOOKUP_FRAG, LOOKUP_INDEX, LOOKUP_NORMAL, VIEW_VERT},
 };
 use glam::Vec3;
 
@@ -18,11 +18,11 @@ use glam::Vec3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// By the normal, times a function of the thickness (Green10, Im16 fig. 4).
-    Normal,
+    Normal = LOOKUP_NORMAL as isize,
     /// To where the bent ray's direction vanishes, with an index that grows with the thickness (Im16 fig. 5).
-    Index,
+    Index = LOOKUP_INDEX as isize,
     /// By the bent ray's lateral components (Cords08).
-    Bent,
+    Bent = LOOKUP_BENT as isize,
 }
 
 /// What a look-up is told.

@@ -10,7 +10,7 @@ pub(crate) mod sort;
 
 use crate::{
     plan::{Call, External, Groups, Plan, Target},
-    shader::{BLOCK, PARTICLE_GROUP},
+    shader::{BLOCK, MOST_GROUPS, PARTICLE_GROUP},
 };
 
 /// Particles as drawn: `glsl/include/particles.glsl`.
@@ -60,9 +60,6 @@ fn rectangle(groups: u32) -> Groups {
     let rows = groups.div_ceil(MOST_GROUPS).max(1);
     Groups::Direct([groups.div_ceil(rows), rows, 1])
 }
-
-/// What Vulkan guarantees of maxComputeWorkGroupCount.
-const MOST_GROUPS: u32 = 65535;
 
 /// The rectangle of groups with an invocation for each particle.
 fn per_particle(count: u32) -> Groups {

@@ -4,7 +4,7 @@ use super::{External, Made, Plan, Target};
 use crate::{
     access::Access,
     resources::Spec,
-    shader::{Binding, Kind, Shader},
+    shader::{Binding, Kind, Scalar, Shader},
 };
 use ash::vk;
 
@@ -64,25 +64,34 @@ impl Recipe {
 
 /// Four bytes for a shader.
 pub(crate) trait Word {
+    const TYPE: Scalar;
     fn word(self) -> u32;
 }
 
 impl Word for u32 {
+    const TYPE: Scalar = Scalar::Uint;
     fn word(self) -> u32 {
         self
     }
 }
 
 impl Word for f32 {
+    const TYPE: Scalar = Scalar::Float;
     fn word(self) -> u32 {
         self.to_bits()
     }
 }
 
 impl Word for bool {
+    const TYPE: Scalar = Scalar::Bool;
     fn word(self) -> u32 {
         u32::from(self)
     }
+}
+
+/// Whether what a shader declares takes such words. Whole numbers are small and not below 0 here: `int` takes them too.
+fn takes<W: Word>(declared: Option<Scalar>) -> bool {
+    declared == Some(W::TYPE) || (declared == Some(Scalar::Int) && W::TYPE == Scalar::Uint)
 }
 
 /// One use of a pipeline.
@@ -157,24 +166,34 @@ impl Call {
     }
 
     /// Sets a specialisation constant.
-    pub fn constant(mut self, name: &'static str, value: impl Word) -> Call {
-        let mut ids = self.recipe.shaders.iter().flat_map(|s| s.constants).filter(|c| c.1 == name).map(|c| c.0);
-        match ids.next() {
-            Some(id) => self.recipe.constants.push((id, value.word())),
+    pub fn constant<W: Word>(mut self, name: &'static str, value: W) -> Call {
+        let mut found = self.recipe.shaders.iter().flat_map(|s| s.constants).filter(|c| c.1 == name);
+        match found.next() {
             None => self.complain(format!("no shader has a constant {name}")),
+            Some((_, _, of)) if !takes::<W>(*of) => {
+                self.complain(format!("the constant {name} is {of:?}, not {:?}", W::TYPE));
+            }
+            Some((id, ..)) if self.recipe.constants.iter().any(|c| c.0 == *id) => {
+                self.complain(format!("the constant {name} is set twice"));
+            }
+            Some((id, ..)) => self.recipe.constants.push((*id, value.word())),
         }
         self
     }
 
     /// Sets a member of the push-constant block.
-    pub fn push(mut self, name: &'static str, value: impl Word) -> Call {
-        let members = self.recipe.shaders.iter().flat_map(|s| s.push);
-        match members.clone().find(|m| m.0 == name) {
-            Some((_, offset)) => {
+    pub fn push<W: Word>(mut self, name: &'static str, value: W) -> Call {
+        let mut members = self.recipe.shaders.iter().flat_map(|s| s.push);
+        match members.find(|m| m.0 == name) {
+            None => self.complain(format!("no shader has a push constant {name}")),
+            Some((_, _, of)) if !takes::<W>(*of) => {
+                self.complain(format!("the push constant {name} is {of:?}, not {:?}", W::TYPE));
+            }
+            Some(_) if self.pushed.contains(&name) => self.complain(format!("the push constant {name} is set twice")),
+            Some((_, offset, _)) => {
                 self.push[*offset as usize..][..4].copy_from_slice(&value.word().to_ne_bytes());
                 self.pushed.push(name);
             }
-            None => self.complain(format!("no shader has a push constant {name}")),
         }
         self
     }
@@ -228,18 +247,40 @@ impl Call {
             return Err(format!("nothing is bound to {}", b.name));
         }
         let members = self.recipe.shaders.iter().flat_map(|s| s.push);
-        if let Some((name, _)) = members.clone().find(|m| !self.pushed.contains(&m.0) && !self.pushed.contains(&"")) {
+        if let Some((name, ..)) = members.clone().find(|m| !self.pushed.contains(&m.0) && !self.pushed.contains(&"")) {
             return Err(format!("the push constant {name} is not set"));
+        }
+        let mut constants = self.recipe.shaders.iter().flat_map(|s| s.constants);
+        if let Some((_, name, _)) = constants.find(|c| !self.recipe.constants.iter().any(|set| set.0 == c.0)) {
+            return Err(format!("the constant {name} is not set"));
         }
         self.recipe.constants.sort_unstable();
         Ok(self.bound.iter().map(|(_, target, access)| (*target, *access)).collect())
+    }
+
+    /// Whether the fragment shader writes each of the attachments, of its type, and no other.
+    pub(super) fn fits_attachments(&self) -> Result<(), String> {
+        let outputs = self.recipe.shaders.last().map_or(&[][..], |s| s.outputs);
+        for (location, of) in outputs {
+            let Some((format, _)) = self.recipe.colors.get(*location as usize) else {
+                return Err(format!("{} writes colour {location}, which is not attached", self.recipe.name()));
+            };
+            if (*of == Some(Scalar::Uint)) != is_uint(*format) {
+                return Err(format!("{} writes {of:?} to colour {location}, which is {format:?}", self.recipe.name()));
+            }
+        }
+        let written = |i: &usize| outputs.iter().any(|(location, _)| *location as usize == *i);
+        match (0..self.recipe.colors.len()).find(|i| !written(i)) {
+            Some(i) => Err(format!("{} does not write colour {i}, which is attached", self.recipe.name())),
+            None => Ok(()),
+        }
     }
 
     /// How the shader that has a binding touches what is bound there.
     fn access(&self, b: &Binding, touch: Touch) -> Result<Access, String> {
         let (image, storage) = match b.kind {
             Kind::SampledImage(_) => (true, false),
-            Kind::StorageImage(_) => (true, true),
+            Kind::StorageImage(..) => (true, true),
             _ => (false, true),
         };
         if image && (touch == Touch::Read) == storage {
@@ -260,17 +301,25 @@ impl Call {
     }
 }
 
+/// Whether a format of a target holds unsigned integers; the others hold floats.
+fn is_uint(format: vk::Format) -> bool {
+    format == vk::Format::R32_UINT
+}
+
 /// Whether a resource is of the kind that the shader has at this binding.
 fn fits(plan: &Plan, b: &Binding, target: Target) -> Result<(), String> {
     let declared = plan.resource(target);
-    let wanted = match b.kind {
-        Kind::SampledImage(texels) | Kind::StorageImage(texels) => Some(texels),
-        _ => None,
+    let (wanted, format) = match b.kind {
+        Kind::SampledImage(texels) => (Some(texels), None),
+        Kind::StorageImage(texels, format) => (Some(texels), Some(format)),
+        _ => (None, None),
     };
     let fits = match (wanted, declared.made) {
         (Some(texels), Made::Own(Spec::Image(spec))) => {
-            let uint = spec.format == vk::Format::R32_UINT;
-            texels.uint == uint && texels.array == spec.array && !texels.cube
+            texels.uint == is_uint(spec.format)
+                && texels.array == spec.array
+                && !texels.cube
+                && format.is_none_or(|f| f == spec.format)
         }
         (Some(texels), Made::Given(External::SceneColor | External::SceneDepth)) => !texels.uint && !texels.cube,
         (Some(texels), Made::Given(External::Environment)) => !texels.uint,

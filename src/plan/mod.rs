@@ -136,7 +136,8 @@ impl Plan {
         }
     }
 
-    fn refuse(&mut self, pass: &'static str, problem: String) {
+    /// Says what a pass got wrong; the first of these becomes the plan's error.
+    pub fn refuse(&mut self, pass: &'static str, problem: String) {
         self.wrong.get_or_insert(Error::Pass { pass, problem });
     }
 

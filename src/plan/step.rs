@@ -176,7 +176,10 @@ impl Plan {
         for (mut call, vertices) in draws {
             call.recipe.colors = formats.clone();
             call.recipe.depth = rendering.depth.is_some();
-            match call.bind(self) {
+            if !call.counts.is_empty() {
+                return self.refuse(pass, "only dispatches count".into());
+            }
+            match call.fits_attachments().and_then(|()| call.bind(self)) {
                 Ok(uses) => uses.into_iter().for_each(&mut add),
                 Err(problem) => return self.refuse(pass, problem),
             }

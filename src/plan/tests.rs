@@ -1,9 +1,9 @@
 //! What a plan refuses: mistakes of passes are found before anything is recorded.
 
-use super::{Call, Groups, Home, Plan, Rendering, Target, Vertices};
+use super::{Call, External, Groups, Home, Plan, Rendering, Target, Vertices};
 use crate::{
     resources::ImageSpec,
-    shader::{NORMALS_COMP, PLANE_FIT_COMP, TILES_COMP},
+    shader::{NORMALS_COMP, PLANE_FIT_COMP, SPLAT_VERT, THICKNESS_FRAG, TILES_COMP},
 };
 use ash::vk::{CompareOp, Format};
 
@@ -23,7 +23,15 @@ fn plan() -> (Plan, Maps) {
 }
 
 fn tiles(m: &Maps) -> Call {
-    Call::compute(&TILES_COMP).read("body_depth", m.depth).read("splash_depth", m.depth).write("front_tiles", m.out)
+    reading(m).write("front_tiles", m.out)
+}
+
+fn reading(m: &Maps) -> Call {
+    both(Call::compute(&TILES_COMP)).read("body_depth", m.depth).read("splash_depth", m.depth)
+}
+
+fn both(call: Call) -> Call {
+    call.constant("HAS_SPLASH", true).constant("HAS_BODY", true)
 }
 
 /// What is said of a dispatch.
@@ -46,17 +54,25 @@ fn names_have_to_be_the_shaders() {
     refused(|_, m| tiles(m).read("body_dept", m.depth), "no shader has a binding body_dept");
     refused(|_, m| tiles(m).read("body_depth", m.depth), "body_depth is bound twice");
     refused(
-        |_, m| Call::compute(&TILES_COMP).read("body_depth", m.depth).write("front_tiles", m.out),
+        |_, m| both(Call::compute(&TILES_COMP)).read("body_depth", m.depth).write("front_tiles", m.out),
         "nothing is bound to splash_depth",
     );
     refused(|_, m| tiles(m).constant("HAS_FOAM", true), "no shader has a constant HAS_FOAM");
+    refused(|_, m| tiles(m).constant("HAS_BODY", true), "the constant HAS_BODY is set twice");
     refused(|_, m| tiles(m).push("sigma", 1.0), "no shader has a push constant sigma");
     refused(|_, m| tiles(m).push_all(&[1.0f32]), "4 bytes are pushed, the shaders have 0");
-    let fit = |m: &Maps| {
-        Call::compute(&PLANE_FIT_COMP).read("depth_in", m.depth).read("normal_raw", m.normal).write("depth_out", m.out)
+    let bare = |m: &Maps| {
+        let call = Call::compute(&PLANE_FIT_COMP).constant("local_size_x", 8).constant("local_size_y", 8);
+        let call = call.constant("EUCLIDEAN", true).constant("PROJECTED", true).counting(&["a", "b", "c", "d"]);
+        call.read("depth_in", m.depth).read("normal_raw", m.normal).write("depth_out", m.out).push("width", 1.0)
     };
-    refused(|_, m| fit(m).counting(&["a", "b", "c", "d"]).push("width", 1.0), "the push constant sigma is not set");
-    assert_eq!(said(|_, m| fit(m).counting(&["a", "b", "c", "d"]).push("width", 1.0).push("sigma", 1.0)), "");
+    let fit = |m: &Maps| bare(m).constant("HALF_WINDOW", 4);
+    assert_eq!(said(|_, m| fit(m).push("sigma", 1.0)), "");
+    refused(|_, m| fit(m), "the push constant sigma is not set");
+    refused(|_, m| bare(m).push("sigma", 1.0), "the constant HALF_WINDOW is not set");
+    refused(|_, m| bare(m).constant("HALF_WINDOW", true), "the constant HALF_WINDOW is Some(Int), not Bool");
+    refused(|_, m| fit(m).push("sigma", 1), "the push constant sigma is Some(Float), not Uint");
+    refused(|_, m| fit(m).push("width", 1.0), "the push constant width is set twice");
 }
 
 #[test]
@@ -64,7 +80,7 @@ fn kinds_have_to_be_the_shaders() {
     // A map of normals holds integers.
     refused(
         |_, m| {
-            Call::compute(&TILES_COMP)
+            both(Call::compute(&TILES_COMP))
                 .read("body_depth", m.normal)
                 .read("splash_depth", m.depth)
                 .write("front_tiles", m.out)
@@ -81,7 +97,7 @@ fn kinds_have_to_be_the_shaders() {
     let buffer = |plan: &mut Plan| plan.buffer("b", 4);
     refused(
         |plan, m| {
-            Call::compute(&TILES_COMP)
+            both(Call::compute(&TILES_COMP))
                 .read("body_depth", buffer(plan))
                 .read("splash_depth", m.depth)
                 .write("front_tiles", m.out)
@@ -91,7 +107,7 @@ fn kinds_have_to_be_the_shaders() {
     // Without layers, where the shader has an array.
     refused(
         |plan, m| {
-            Call::compute(&TILES_COMP)
+            both(Call::compute(&TILES_COMP))
                 .read("body_depth", plan.flat("flat", Format::R32_SFLOAT))
                 .read("splash_depth", m.depth)
                 .write("front_tiles", m.out)
@@ -100,7 +116,7 @@ fn kinds_have_to_be_the_shaders() {
     );
     refused(
         |_, m| {
-            Call::compute(&TILES_COMP)
+            both(Call::compute(&TILES_COMP))
                 .write("body_depth", m.depth)
                 .read("splash_depth", m.depth)
                 .write("front_tiles", m.out)
@@ -110,16 +126,14 @@ fn kinds_have_to_be_the_shaders() {
 }
 
 #[test]
+fn storage_images_have_the_shaders_format() {
+    let other = |plan: &mut Plan| plan.map("wide", Format::R32G32_SFLOAT, 2);
+    refused(|plan, m| reading(m).write("front_tiles", other(plan)), "and wide is not");
+}
+
+#[test]
 fn a_step_does_not_read_what_it_writes() {
-    refused(
-        |_, m| {
-            Call::compute(&TILES_COMP)
-                .read("body_depth", m.depth)
-                .read("splash_depth", m.depth)
-                .write("front_tiles", m.depth)
-        },
-        "depth is written in one step and used in it once more",
-    );
+    refused(|_, m| reading(m).write("front_tiles", m.depth), "depth is written in one step and used in it once more");
 }
 
 #[test]
@@ -149,6 +163,27 @@ fn attachments_fit_together() {
         })
         .contains("different sizes")
     );
+}
+
+/// A fragment shader writes each colour that is attached, of its type, and no other.
+#[test]
+fn attachments_are_the_shaders() {
+    let say = |into: &dyn Fn(&mut Plan, &Maps) -> Rendering, call: fn(Call) -> Call| {
+        let (mut plan, maps) = plan();
+        let rendering = into(&mut plan, &maps);
+        let bounds = plan.given(External::Centers);
+        let draw = call(Call::draw(&SPLAT_VERT[0], &THICKNESS_FRAG[0])).read("order", bounds);
+        plan.render("pass", rendering, vec![(draw, Vertices::Direct(3))]);
+        plan.finish().err().map_or_else(String::new, |e| e.to_string())
+    };
+    // The right attachments: what is missing is told next.
+    assert!(say(&|_, m| Rendering::into(m.depth, 0), |c| c).contains("no shader has a binding order"));
+    assert!(say(&|_, m| Rendering::into(m.normal, 0), |c| c).contains("to colour 0, which is R32_UINT"));
+    let two = |_: &mut Plan, m: &Maps| Rendering::into(m.depth, 0).and(m.out, 0);
+    assert!(say(&two, |c| c).contains("does not write colour 1, which is attached"));
+    let none = |_: &mut Plan, _: &Maps| Rendering { colors: Vec::new(), depth: None };
+    assert!(say(&none, |c| c).contains("writes colour 0, which is not attached"));
+    assert!(say(&|_, m| Rendering::into(m.depth, 0), |c| c.counting(&["a"])).contains("only dispatches count"));
 }
 
 #[test]

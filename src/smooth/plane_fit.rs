@@ -56,8 +56,10 @@ impl Filter for PlaneFit {
     fn record(&self, plan: &mut Plan, body: &Body) -> Target {
         let reach = self.window / 2;
         let edge = tile(reach);
-        // Asked for, so there (`Filter::asks`).
-        let Some(normal) = body.normal else { return body.depth };
+        let Some(normal) = body.normal else {
+            plan.refuse("plane fit", "there are no normals of the particles, which it asks for".into());
+            return body.depth;
+        };
         alternate(plan, body, self.iterations, |plan, _, from, to| {
             let call = Call::compute(&PLANE_FIT_COMP)
                 .read("depth_in", from)

@@ -1,6 +1,6 @@
 //! Twin of `glsl/extent.comp`: the box of all positions and the cells it occupies.
 
-use crate::space::power_of_two;
+use crate::{shader::FURTHEST_CELL, space::power_of_two};
 use glam::Vec3;
 
 /// What the extent pass finds.
@@ -51,13 +51,11 @@ pub fn kept(positions: &[Vec3], radius: f32) -> Kept {
     kept
 }
 
-/// Beyond this many cells from the origin all is one cell.
-const FURTHEST_CELL: f64 = (1u32 << 29) as f64;
-
 /// floor(x / edge) of a finite coordinate.
 pub fn cell_of(x: f32, edge: f32) -> i32 {
     // The quotient of two float32 lies further from a whole number than float64 rounds, or is one.
-    (f64::from(x) / f64::from(edge)).floor().clamp(-FURTHEST_CELL, FURTHEST_CELL) as i32
+    let furthest = f64::from(FURTHEST_CELL);
+    (f64::from(x) / f64::from(edge)).floor().clamp(-furthest, furthest) as i32
 }
 
 /// The box; `more` cells on each side are occupied too (relation table: 1).
