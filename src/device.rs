@@ -70,7 +70,7 @@ const MAP_FEATURES: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
 
 /// Limits and options of the device that passes ask about.
 #[derive(Clone, Copy, Debug)]
-pub struct Limits {
+pub(crate) struct Limits {
     /// Largest point sprite in pixels; 1 where large points are off.
     pub point_size: f32,
     /// Largest image edge.
@@ -127,7 +127,7 @@ pub fn required_features() -> vk::PhysicalDeviceVulkan13Features<'static> {
 }
 
 /// A device's name.
-pub fn name(properties: &vk::PhysicalDeviceProperties) -> String {
+pub(crate) fn name(properties: &vk::PhysicalDeviceProperties) -> String {
     properties.device_name_as_c_str().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
 }
 

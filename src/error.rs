@@ -4,6 +4,7 @@ use ash::vk;
 
 /// Errors of the renderer. Each names the pass, resource or parameter, and the remedy.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The device lacks something every frame needs.
     #[error(

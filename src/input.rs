@@ -9,6 +9,7 @@ use ash::vk;
 
 /// What a frame shows where no liquid is, and what rays bring back that meet neither liquid nor scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Background {
     /// The environment, and before it the scene: every pixel of the output is written, with alpha 1. What the output held
     /// is lost, and where the scene's depth is cleared, so is its colour.
@@ -35,6 +36,7 @@ pub struct EnvironmentInput {
 
 /// How an environment maps directions; those of the world, turned so that [`Camera::up`] becomes +y.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum EnvironmentShape {
     /// A `TYPE_2D` view, laid out as [`crate::Equirect`] is.
     #[default]

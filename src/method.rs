@@ -5,6 +5,7 @@ use crate::{Error, layers::Layers, optics::Optics, parameters::Part, smooth::Smo
 /// Layers of surfaces, their smoothing, and the optics between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[non_exhaustive]
 pub struct Method {
     /// Which surfaces are kept of the particles.
     pub layers: Layers,
@@ -63,6 +64,11 @@ impl Offers {
 }
 
 impl Method {
+    /// One member of each family; [`Method::validate`] says whether they go together.
+    pub fn new(layers: impl Into<Layers>, smooth: impl Into<Smooth>, optics: impl Into<Optics>) -> Method {
+        Method { layers: layers.into(), smooth: smooth.into(), optics: optics.into() }
+    }
+
     /// Checks every parameter, and that the three go together.
     pub fn validate(&self) -> Result<(), Error> {
         self.layers.parameters().validate()?;

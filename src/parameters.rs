@@ -96,6 +96,7 @@ macro_rules! choices {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[non_exhaustive]
         pub enum $Name { $($(#[$about])* #[cfg_attr(feature = "serde", serde(rename = $word))] $Member,)* }
 
         impl $crate::parameters::Value for $Name {

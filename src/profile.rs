@@ -9,6 +9,7 @@ use ash::vk;
 
 /// GPU time of one pass in milliseconds.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct PassTime {
     /// The pass's name, also its debug label.
     pub name: String,
@@ -23,6 +24,7 @@ pub struct PassTime {
 
 /// GPU times of one frame.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FrameTimes {
     /// Every pass, in order.
     pub passes: Vec<PassTime>,

@@ -1,28 +1,29 @@
 //! The renderer: made for a host's device, fed with particles, records frames.
 
+mod ahead;
 mod uploads;
 
 use crate::{
-    Error, Settings, access,
+    Error, access,
     device::{self, Host, Limits},
     frame::{self, Preparation, Scene},
-    input::{Background, EnvironmentInput, EnvironmentShape, FrameInput},
+    input::{EnvironmentInput, EnvironmentShape, FrameInput},
     passes::shape::LAST_CLASSES,
     pipeline::Pipelines,
     plan::{Home, Made, Plan},
-    prepare::{self, DevicePositions, Search},
+    prepare::DevicePositions,
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder},
     resources::{Buffer, Image, Resource, Retired, Spec},
     scale::Scale,
     slot::Slot,
     space::{self, Space},
-    table::{self, LedgerEntry, Table},
+    table::Table,
 };
+pub use ahead::Amount;
+use ahead::check_memory;
 use ash::vk;
 use glam::Vec3;
-use std::collections::HashSet;
-use uploads::{PARTICLE_ARRAYS, SPEEDS};
 
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
 ///
@@ -58,20 +59,6 @@ pub struct Renderer {
     pub(crate) counters: [Vec<&'static str>; 2],
     /// Whether the last frame left classes.
     last_classes: bool,
-}
-
-/// How many particles frames will draw.
-#[derive(Clone, Copy, Debug)]
-pub enum Amount<'a> {
-    /// Prepared on the host.
-    Prepared {
-        /// On their own.
-        splash: usize,
-        /// Of the body.
-        body: usize,
-    },
-    /// Prepared on the device.
-    OnDevice(&'a DevicePositions),
 }
 
 /// What the renderer remembers of the particles it was given.
@@ -157,81 +144,6 @@ impl Renderer {
             return Err(Error::parameter("size", what, format!("use 1 to {most} pixels each way on this device")));
         }
         Ok(())
-    }
-
-    /// Device memory that frames of a size take, resource by resource, before anything is allocated. Particles that the
-    /// host prepared are extra, 36 bytes each and 4 more with their speeds, and a static environment map, 16 bytes a texel.
-    pub fn memory_requirements(
-        &self,
-        size: [u32; 2],
-        amount: Amount,
-        settings: &Settings,
-    ) -> Result<Vec<LedgerEntry>, Error> {
-        self.check_size(size)?;
-        settings.validate()?;
-        let mut scene = Scene::new(settings, size, [0, 0], &self.limits);
-        self.fill(&mut scene, amount)?;
-        Ok(table::ledger(&self.host.device, &frame::plan(&scene)?))
-    }
-
-    /// Device memory in use now, resource by resource.
-    pub fn memory(&self) -> Vec<LedgerEntry> {
-        let mut ledger: Vec<_> = self.tables.iter().flat_map(Table::ledger).collect();
-        let entry = |name, bytes, per_particle| LedgerEntry { name, bytes, per_particle };
-        let particles = PARTICLE_ARRAYS.into_iter().zip(self.particles.iter().flatten());
-        ledger.extend(particles.map(|(name, b)| entry(name, b.bytes, true)));
-        ledger.extend(self.speeds.iter().map(|b| entry(SPEEDS, b.bytes, true)));
-        ledger.extend(self.environment.iter().map(|i| entry("environment", i.bytes, false)));
-        ledger
-    }
-
-    /// Compiles, on all cores, whatever frames with these settings can need, so that recording them compiles nothing:
-    /// with particles of either class, of both or of none, prepared on the host or on the device, with and without a scene,
-    /// before either background, in either shape of environment. Says how many pipelines were made; those that were there
-    /// already count for nothing. To be called after [`Renderer::resize`], when there is time: at loading, say.
-    ///
-    /// That is dozens of pipelines; [`Renderer::warm_up_like`] makes those of one kind of frame. Without either, what a
-    /// frame needs is compiled when it is first recorded.
-    pub fn warm_up(&mut self, settings: &Settings) -> Result<usize, Error> {
-        settings.validate()?;
-        let size = self.size.map(|s| s.max(1));
-        let scene = |classes| {
-            let mut scene = Scene::new(settings, size, classes, &self.limits);
-            scene.output = self.output;
-            scene
-        };
-        let mut scenes = Vec::new();
-        for classes in [[0, 0], [1, 0], [0, 1], [1, 1]] {
-            for has_scene in [false, true] {
-                for background in [Background::Environment, Background::Host] {
-                    for environment in [EnvironmentShape::Equirect, EnvironmentShape::Cube] {
-                        scenes.push(Scene { has_scene, background, environment, ..scene(classes) });
-                    }
-                }
-            }
-        }
-        for search in [Search::Runs, Search::Relation] {
-            for keep in [None, Some(1.0)] {
-                let options = prepare::Options { search, ..Default::default() };
-                let positions =
-                    DevicePositions::packed(vk::Buffer::null(), 1, 1.0).options(options).keep_class_below(keep);
-                let mut scene = scene([0, 0]);
-                self.fill(&mut scene, Amount::OnDevice(&positions))?;
-                scenes.push(scene);
-            }
-        }
-        let plans: Vec<_> = scenes.iter().map(frame::plan).collect::<Result<_, _>>()?;
-        let recipes: HashSet<_> = plans.iter().flat_map(Plan::recipes).collect();
-        self.pipelines.make(&self.host, recipes)
-    }
-
-    /// Compiles what a frame like this one needs and is not there yet, of the particles last given or of its positions.
-    /// Of what it names (outputs, buffers, images) nothing is touched; null handles will do. Says how many pipelines were
-    /// made.
-    pub fn warm_up_like(&mut self, input: &FrameInput) -> Result<usize, Error> {
-        input.settings.validate()?;
-        let plan = frame::plan(&self.scene_of(input)?)?;
-        self.pipelines.make(&self.host, plan.recipes())
     }
 
     /// What a frame draws.
@@ -469,18 +381,6 @@ impl Renderer {
         }
         self.slots.drain(..).for_each(|mut slot| slot.destroy(&self.host));
         self.pipelines.destroy(&self.host);
-    }
-}
-
-/// Refuses a frame that does not fit the device, before anything is made for it.
-fn check_memory(host: &Host, limits: &Limits, tables: &[Table; 2], plan: &Plan) -> Result<(), Error> {
-    if tables.iter().zip(HOMES).all(|(table, home)| table.fits(plan, home)) {
-        return Ok(());
-    }
-    let needed: u64 = table::ledger(&host.device, plan).iter().map(|e| e.bytes).sum();
-    match needed.checked_sub(limits.memory) {
-        None | Some(0) => Ok(()),
-        Some(missing) => Err(Error::MemoryShort { needed, available: limits.memory, missing }),
     }
 }
 

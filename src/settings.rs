@@ -94,6 +94,7 @@ impl Settings {
 /// * Viewports of negative height turn y around after the projection: negate `projection`'s second row.
 /// * Of the projection x and y count, and for the depth of a host's scene how z becomes a depth; `near` stands for itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Camera {
     /// World to eye: a rotation, with or without a reflection, and a translation.
     pub view: Mat4,
@@ -111,6 +112,11 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// A camera of the host's own matrices (see the fields); up is +y, and the environment is not turned.
+    pub fn new(view: Mat4, projection: Mat4, near: f32) -> Camera {
+        Camera { view, projection, near, up: Vec3::Y, environment_rotation: 0.0 }
+    }
+
     /// A camera at `eye` that looks at `target`, `fov_y` radians high. Its projection is infinite: the depth is 0 at `near`
     /// and 1 infinitely far away, where a depth buffer is cleared to.
     pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, fov_y: f32, aspect: f32, near: f32) -> Camera {

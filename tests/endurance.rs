@@ -140,7 +140,8 @@ fn settings(kind: &Kind) -> Settings {
     }
     let optics = ["one", "two", "", "four"][kind.refractions as usize - 1];
     let optics = Optics::named(optics).expect("one of three");
-    Method { optics, smooth: PlaneFit::default().iterations(kind.iterations).into(), ..Method::default() }.into()
+    let smooth = PlaneFit::default().iterations(kind.iterations);
+    Method::new(Method::default().layers, smooth, optics).into()
 }
 
 fn run(gpu: &Gpu, kind: &Kind) -> Endured {

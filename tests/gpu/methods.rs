@@ -68,7 +68,7 @@ fn members_go_together_or_say_why_not() {
     for layers in Layers::all() {
         for smooth in Smooth::all() {
             for optics in Optics::all() {
-                let method = Method { layers, smooth, optics };
+                let method = Method::new(layers, smooth, optics);
                 let [(_, own), ..] = method.members();
                 match (method.validate(), lacking(&method)) {
                     (Ok(()), None) => accepted.push(method),

@@ -89,10 +89,9 @@ fn a_warmed_up_renderer_compiles_nothing() {
 #[test]
 fn pools_are_as_large_as_the_plan() {
     let many = |iterations| {
-        Settings::from(meniscus::Method {
-            smooth: CurvatureFlow::default().iterations(iterations).into(),
-            ..Default::default()
-        })
+        let mut method = meniscus::Method::default();
+        method.smooth = CurvatureFlow::default().iterations(iterations).into();
+        Settings::from(method)
     };
     each_driver(|driver| {
         with_renderer(driver, FORMAT, 1, |gpu, renderer| {

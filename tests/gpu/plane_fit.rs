@@ -216,9 +216,11 @@ fn flakes_at_grazing_angles() {
             (9.0, Weighting::Euclidean, 0.9),
         ];
         for (sigma, weighting, near) in kinds {
+            let mut camera = camera(Vec3::ZERO, Vec3::NEG_Z, size);
+            camera.near = near;
             let case = Case {
                 particles: particles.clone(),
-                camera: Camera { near, ..camera(Vec3::ZERO, Vec3::NEG_Z, size) },
+                camera,
                 settings: settings(9, 2, sigma, weighting),
                 size,
                 eye_inside: false,

@@ -90,8 +90,9 @@ fn every_place_gives_the_same_picture() {
         let positions: Vec<_> = positions.iter().map(|p| *p + shift).collect();
         let input = Input { positions: &positions, radius: 0.125, classes: None, ellipsoids: None };
         let particles = prepare(&input, &Options::default()).expect("prepared").0;
-        let view = case.camera.view * Mat4::from_translation(-shift);
-        (Case { particles, camera: Camera { view, ..case.camera }, ..case.clone() }, positions)
+        let mut camera = case.camera;
+        camera.view *= Mat4::from_translation(-shift);
+        (Case { particles, camera, ..case.clone() }, positions)
     };
     let shift = Vec3::new(4096.0, -2048.0, 1024.0);
     each_driver(|driver| {
@@ -131,11 +132,12 @@ fn a_left_handed_world_is_drawn_as_its_mirror_image() {
     let mirrored = |e: &Ellipsoid| Ellipsoid { center: mirror * e.center, axes: mirror * e.axes };
     let left = Particles { ellipsoids: right.ellipsoids.iter().map(mirrored).collect(), ..right.clone() };
     let camera = camera(Vec3::new(0.4, 0.5, 2.2), Vec3::ZERO, SIZE);
-    let view = camera.view * Mat4::from_mat3(mirror);
+    let mut mirrored_camera = camera;
+    mirrored_camera.view *= Mat4::from_mat3(mirror);
     let case =
         |particles, camera| Case { particles, camera, settings: Settings::default(), size: SIZE, eye_inside: false };
     let right = case(right, camera);
-    let left = case(left, Camera { view, ..camera });
+    let left = case(left, mirrored_camera);
     left.camera.validate().expect("a reflection is rigid");
     each_driver(|driver| {
         let (a, b) = (driver.shoot(&right), driver.shoot(&left));

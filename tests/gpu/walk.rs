@@ -328,8 +328,8 @@ fn what_absorbs_everything_is_black() {
     let mut settings = Settings::default().absorption(Vec3::new(1e30, 3e38, 0.0));
     settings.set("sigma", "180").expect("a parameter");
     let aspect = size[0] as f32 / size[1] as f32;
-    let projection = glam::camera::rh::proj::vulkan::perspective_infinite(45f32.to_radians(), aspect, 0.01);
-    let camera = meniscus::Camera { projection, ..dam_break.camera };
+    let mut camera = dam_break.camera;
+    camera.projection = glam::camera::rh::proj::vulkan::perspective_infinite(45f32.to_radians(), aspect, 0.01);
     let case = Case { settings, size, camera, ..dam_break.clone() };
     each_driver(|driver| {
         let shot = driver.shoot(&case);
