@@ -44,6 +44,22 @@ fn a_filter_has_one_home() {
     assert!(found >= 7, "only {found} filters");
 }
 
+/// The addition that CONTRIBUTING.md shows is the one that is here.
+#[test]
+fn the_example_of_a_member_is_the_source() {
+    let text = fs::read_to_string(root().join("CONTRIBUTING.md")).expect("CONTRIBUTING.md");
+    let file = "src/smooth/curvature_flow.rs";
+    let shown = text.split(&format!("+++ b/{file}")).nth(1).expect("a diff of the file");
+    let lines: Vec<_> = shown.lines().skip(1).map_while(|l| l.strip_prefix('+')).collect();
+    let source = fs::read_to_string(root().join(file)).expect("the file");
+    assert_eq!(lines, source.lines().collect::<Vec<_>>(), "CONTRIBUTING.md and {file}");
+    let family = fs::read_to_string(root().join("src/smooth/mod.rs")).expect("the family");
+    let added = text.split("--- /dev/null").next().expect("a diff").lines().filter_map(|l| l.strip_prefix('+'));
+    let added: Vec<_> = added.filter(|l| !l.starts_with("++")).collect();
+    assert_eq!(added.len(), 2, "lines elsewhere: {added:?}");
+    assert!(added.iter().all(|l| family.lines().any(|own| own == *l)), "{added:?}");
+}
+
 fn walk(folder: &Path, check: &mut dyn FnMut(&Path)) {
     for entry in fs::read_dir(folder).expect("readable folder") {
         let path = entry.expect("readable").path();
