@@ -90,7 +90,7 @@ pub struct FrameInput<'a> {
     pub slot: usize,
     /// Camera.
     pub camera: &'a Camera,
-    /// Smoothing and optics.
+    /// Method, liquid and drawing.
     pub settings: &'a Settings,
     /// Positions on the device, to be prepared in this frame and drawn instead of [`crate::Renderer::set_particles`]'s.
     pub positions: Option<DevicePositions>,
@@ -162,7 +162,7 @@ impl<'a> FrameInput<'a> {
         Ok(())
     }
 
-    /// A frame of the particles last given, before the environment alone; anything else by struct update.
+    /// A frame of the particles last given, before the environment alone; the methods below change that.
     pub fn new(slot: usize, camera: &'a Camera, settings: &'a Settings, output: vk::ImageView) -> FrameInput<'a> {
         FrameInput {
             slot,

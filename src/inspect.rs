@@ -5,7 +5,9 @@ use crate::{
     Camera, Error, Renderer, Settings,
     frame::Scene,
     layers::Surfaces,
+    passes::shape::COUNTED,
     plan::{COUNTERS, Plan},
+    prepare::Report,
     recorder::PlanEntry,
     resources::Resource,
     scale::Scale,
@@ -40,6 +42,20 @@ impl Inspection {
             p.neighbours = self.neighbours;
         }
     }
+}
+
+/// What became of particles that were prepared, by the names of the counters; classes first, then guards.
+pub fn counted(report: &Report) -> [(&'static str, usize); 6] {
+    let r = report;
+    let counts = [r.splash, r.body, r.few_neighbours, r.degenerate, r.clamped_long, r.clamped_ratio];
+    std::array::from_fn(|i| (COUNTED[i], counts[i]))
+}
+
+/// The report that counters of a frame are, which prepared particles on the device.
+pub fn report(counters: &[(&str, u32)]) -> Report {
+    let count = |name| counters.iter().find(|c| c.0 == name).map_or(0, |c| c.1 as usize);
+    let [splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio] = COUNTED.map(count);
+    Report { splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio }
 }
 
 /// Targets that hold the liquid's surfaces as light meets them: the body's after smoothing. `None` where the frame has none.

@@ -12,9 +12,10 @@ pub struct Parameter {
     pub name: &'static str,
     /// What it is.
     pub doc: &'static str,
-    /// Unit; empty where it has none. "pixels" is the edge of a window of the picture's pixels: who renders at a multiple of
-    /// the picture's size widens it.
+    /// Unit of the value that it has; empty where it has none.
     pub unit: &'static str,
+    /// The same where the unit hangs on another parameter: each, and when.
+    pub units: &'static str,
     /// What it must be, as in "use …".
     pub range: &'static str,
     /// Words to choose from; empty if any value of the range will do.
@@ -35,6 +36,9 @@ pub trait Parameters {
     fn set(&mut self, name: &str, text: &str) -> Result<(), Error>;
     /// Checks every range.
     fn validate(&self) -> Result<(), Error>;
+    /// Makes them those of a picture that is rendered at `times` its size and looks the same: what is counted in pixels
+    /// changes as it is declared to, and may leave its range.
+    fn enlarge(&mut self, times: u32);
 }
 
 /// What a parameter can hold.
@@ -113,7 +117,9 @@ macro_rules! choices {
 pub(crate) use choices;
 
 /// A struct of parameters: for each its documentation, type and default, then unit, what it must be, and a check of that.
-/// Attributes in brackets before it take the place of `non_exhaustive`.
+/// `"a" if other else "b"` is a unit that hangs on another parameter. `enlarged |all, times| …` says what becomes of one that
+/// is counted in pixels ([`Parameters::enlarge`]). Attributes in brackets before the struct take the place of
+/// `non_exhaustive`.
 macro_rules! parameters {
     ($(#[doc = $about:literal])+ pub struct $Name:ident { $($body:tt)* }) => {
         $crate::parameters::parameters! {
@@ -124,7 +130,8 @@ macro_rules! parameters {
     };
     ([$(#[$meta:meta])*] $(#[doc = $about:literal])+ pub struct $Name:ident { $(
         $(#[doc = $doc:literal])+
-        $field:ident: $Type:ty = $default:expr, $unit:literal, $range:literal => $check:expr;
+        $field:ident: $Type:ty = $default:expr, $unit:literal $(if $when:ident else $other:literal)?, $range:literal
+            => $check:expr $(, enlarged |$all:ident, $times:ident| $enlarged:expr)?;
     )* }) => {
         $(#[doc = $about])+
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,7 +140,7 @@ macro_rules! parameters {
         $(#[$meta])*
         pub struct $Name { $(
             $(#[doc = $doc])+
-            #[doc = concat!("\n\n", "Unit: ", $unit, ". Use ", $range, ". Default: `", stringify!($default), "`.")]
+            #[doc = concat!("\n\n", "Unit: ", $unit, $(" if `", stringify!($when), "`, else ", $other,)? ". Use ", $range, ". Default: `", stringify!($default), "`.")]
             pub $field: $Type,
         )* }
 
@@ -165,7 +172,12 @@ macro_rules! parameters {
                 vec![$($crate::parameters::Parameter {
                     name: stringify!($field),
                     doc: concat!($($doc,)+).trim_ascii(),
-                    unit: $unit,
+                    unit: {
+                        let unit = $unit;
+                        $(let unit = if self.$when { unit } else { $other };)?
+                        unit
+                    },
+                    units: concat!($unit $(, " (if ", stringify!($when), ") or ", $other)?),
                     range: $range,
                     choices: <$Type>::CHOICES,
                     default: default.$field.text(),
@@ -197,6 +209,16 @@ macro_rules! parameters {
                     }
                 )*
                 Ok(())
+            }
+
+            fn enlarge(&mut self, times: u32) {
+                let before = *self;
+                $($({
+                    fn enlarged($all: &$Name, $times: u32) -> $Type {
+                        $enlarged
+                    }
+                    self.$field = enlarged(&before, times);
+                })?)*
             }
         }
     };

@@ -79,6 +79,16 @@ impl Settings {
         self.method.set(name, text)
     }
 
+    /// The same for a picture that is rendered at `times` its size, to be averaged: what is counted in pixels covers the same
+    /// part of it. Parameters may leave their ranges.
+    #[must_use]
+    pub fn enlarged(mut self, times: u32) -> Settings {
+        let m = &mut self.method;
+        let groups = [m.layers.parameters_mut(), m.smooth.parameters_mut(), m.optics.parameters_mut()];
+        groups.into_iter().for_each(|g| g.enlarge(times));
+        self
+    }
+
     /// Checks every range, and that the members of the method go together.
     pub fn validate(&self) -> Result<(), Error> {
         self.method.validate()?;

@@ -4,13 +4,6 @@
 // over the neighbours j that have a surface. Near a boundary only one side is averaged, which warps the map towards it
 // (Imai16 section 3.2, problem 2): that is the method's own failure, and it stays.
 //
-// name          unit                 range     published default
-// sigma_space   pixels, or radii     > 0       not printed; Truong18's comparison: reach / 3, the reach 0.5 r projected
-//               (PROJECTED)
-// sigma_depth   radii                > 0       not printed; Truong18's comparison: 10 / 3
-// REACH         pixels               0 to 27   not printed; window = 2 REACH + 1
-// iterations                                   not printed by Imai16; Truong18's comparison: 3
-//
 // Counters: COUNTERS + 0: pixels whose kernel (3 sigma_space) was clipped to REACH; only if PROJECTED.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -4,13 +4,6 @@
 // over the neighbours j in the row or column that have a surface. Green10 writes exp(-(x blurScale)^2) and
 // exp(-(rise blurDepthFalloff)^2): sigma = 1 / (sqrt(2) times either).
 //
-// name          unit                 range     published default
-// sigma_space   pixels, or radii     > 0       not printed
-//               (PROJECTED)
-// sigma_depth   radii                > 0       not printed
-// REACH         pixels               0 to 64   not printed (filterRadius)
-// iterations                                   1 (a row pass and a column pass)
-//
 // Counters: COUNTERS + 0: pixels whose kernel (3 sigma_space) was clipped to REACH; only if PROJECTED.
 #version 460
 #extension GL_GOOGLE_include_directive : require

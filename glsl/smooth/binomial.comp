@@ -8,12 +8,6 @@
 // What is kept here is how much is missing from 1, a sum of no terms where nothing is, and so exactly 0. What lies outside
 // the image is unknown and counts for nothing. Where the eye is inside (d < 0) there is liquid.
 //
-// name          unit                 range     published default
-// kernel        projected radii      >= 0      1 (section 2.2), to be varied by the user
-// REACH         pixels               0 to 60   not printed; smallest weight is 1 / B(2k, k)
-// SILHOUETTE_MAP                               true; where iterated, only of the last iteration
-// iterations                                   1 (a row pass and a column pass)
-//
 // Counters: COUNTERS + 0: pixels whose kernel was clipped to REACH.
 #version 460
 // Compiled with one of: ACROSS, DOWN

@@ -9,12 +9,6 @@
 // Central differences. On an axis where a neighbour has no surface, or one beyond a jump, both derivatives are zero, so that
 // nothing is smoothed across (vdLaan09: "at boundaries").
 //
-// name          unit                 range     published default
-// time_step     radii times pixels   >= 0      not printed; public implementations: 0.0005 in their own scenes' units.
-//                                              Ours: 0.05, the longest stable where a radius covers 10 pixels
-// jump          radii                0 to 1000 not printed; Truong18's comparison: 5
-// iterations                                   as many as there is time for; public implementations: 60
-//
 // Explicit steps diverge above dt (a_x + a_y) / d = 1 (the flow spreads by at most a dt / (2 d) square pixels a step, and
 // two dimensions admit a quarter each): longer ones are shortened to that.
 //

@@ -9,16 +9,6 @@
 // opposite pair. ALONG: each side has a range of its own. FULL: all share one, and it grows ring by ring, so that the order
 // within a ring does not matter; the paper leaves that order open.
 //
-// name          unit                 range     published default
-// threshold     radii                > 0       10 (10.5 in the authors' own program)
-// clamp         radii                >= 0      1 (mu = r)
-// kernel        radii, projected     >= 0      0.5 (the authors' own program: filter size 5, by 0.1)
-// REACH         pixels               0 to 100  100 (the authors' own program)
-// FIXED         -                              false; true, with REACH 4, for the clean-up that follows the two 1D passes
-// EMPTY_FAR     -                              true: no surface is too far, as every depth beyond high. Our default is
-//                                              false: it counts for nothing
-// iterations                                   3 (the authors' own program): rows, columns, clean-up; or FULL alone
-//
 // Counters: COUNTERS + 0: pixels whose kernel was clipped to REACH; none if FIXED.
 #version 460
 // Compiled with one of: ALONG, FULL

@@ -1,16 +1,14 @@
 //! Light bends at up to four surfaces.
 
-use super::{Fresnel, Shading, walk::Walk};
+use super::{
+    Fresnel, Shading,
+    walk::{Walk, walk_parameters},
+};
 use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::parameters, plan::Plan};
 
-parameters! {
+walk_parameters! {
     /// Up to four refractions, through two volumes of liquid (Imai16 §4.4), with total internal reflection.
-    pub struct Four {
-        /// Total internal reflections followed in one walk
-        internal_reflections: u32 = 4, "", "0 to 64" => |n| *n <= 64;
-        /// Reflectance
-        fresnel: Fresnel = Fresnel::Schlick, "", "schlick (Schlick's approximation) or exact" => |_| true;
-    }
+    pub struct Four
 }
 
 impl Shading for Four {

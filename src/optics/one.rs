@@ -1,6 +1,6 @@
 //! Light bends once, where it enters.
 
-use super::{Fresnel, Shading, walk::Walk};
+use super::{Fresnel, Shading, four::Four, walk::Walk};
 use crate::{frame::Scene, layers::Surfaces, parameters::parameters, plan::Plan};
 
 parameters! {
@@ -19,7 +19,7 @@ impl Shading for One {
 
 impl From<One> for Walk {
     fn from(p: One) -> Walk {
-        // Inside the body nothing is followed; the number is the default's, so that pipelines are shared.
-        Walk { refractions: 1, internal_reflections: 4, fresnel: p.fresnel }
+        // Inside the body nothing is followed; what is said of that is the default, so that pipelines are shared.
+        Walk { refractions: 1, fresnel: p.fresnel, ..Four::default().into() }
     }
 }

@@ -10,12 +10,12 @@ use glam::Vec3;
 parameters! {
     /// A look-up moved by the surface's normal times T = 1 - exp(-thickness) (Im16 fig. 4).
     pub struct Ssfr {
-        /// Offset where T is 1 and the normal lies across the view
+        /// Offset where T is 1 and the normal lies across the view (Im16 fig. 4: 1)
         strength: f32 = 1.0, "picture edges", "a finite value of at least 0" => |s| s.is_finite() && *s >= 0.0;
-        /// What thickness is multiplied by in T; the papers do not say theirs
+        /// What thickness is multiplied by in T; ours: the papers do not say in what unit theirs is
         thickness_scale: f32 = 0.1, "1 / particle radius", "a finite value of at least 0"
             => |s| s.is_finite() && *s >= 0.0;
-        /// Reflectance
+        /// Reflectance; ours: Im16 names Fresnel and no formula
         fresnel: Fresnel = Fresnel::Schlick, "", "schlick (Schlick's approximation) or exact" => |_| true;
     }
 }

@@ -11,10 +11,10 @@ parameters! {
     /// A look-up where the bent ray's direction vanishes; thin liquid bends less (Im16 fig. 5). Its line "refract(...).xy -
     /// E.z" would add 1 to both coordinates in the middle of the picture: what it must mean is the perspective division.
     pub struct SsfrIndex {
-        /// What thickness is multiplied by in T = 1 - exp(-thickness); the paper does not say its own
+        /// What thickness is multiplied by in T = 1 - exp(-thickness); ours: the paper does not say in what unit its own is
         thickness_scale: f32 = 0.1, "1 / particle radius", "a finite value of at least 0"
             => |s| s.is_finite() && *s >= 0.0;
-        /// Reflectance
+        /// Reflectance; ours: Im16 names Fresnel and no formula
         fresnel: Fresnel = Fresnel::Schlick, "", "schlick (Schlick's approximation) or exact" => |_| true;
     }
 }

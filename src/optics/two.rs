@@ -1,16 +1,14 @@
 //! Light bends at up to two surfaces.
 
-use super::{Fresnel, Shading, walk::Walk};
+use super::{
+    Fresnel, Shading,
+    walk::{Walk, walk_parameters},
+};
 use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::parameters, plan::Plan};
 
-parameters! {
+walk_parameters! {
     /// Up to two refractions, through one volume of liquid (Imai14), with total internal reflection.
-    pub struct Two {
-        /// Total internal reflections followed in one walk
-        internal_reflections: u32 = 4, "", "0 to 64" => |n| *n <= 64;
-        /// Reflectance
-        fresnel: Fresnel = Fresnel::Schlick, "", "schlick (Schlick's approximation) or exact" => |_| true;
-    }
+    pub struct Two
 }
 
 impl Shading for Two {

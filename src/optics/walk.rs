@@ -11,6 +11,22 @@ use crate::{
 };
 use ash::vk::Format;
 
+/// The parameters of walks that follow light inside the liquid.
+macro_rules! walk_parameters {
+    ($(#[doc = $about:literal])+ pub struct $Name:ident) => {
+        parameters! {
+            $(#[doc = $about])+
+            pub struct $Name {
+                /// Total internal reflections followed in one walk; ours: the papers follow none
+                internal_reflections: u32 = 4, "", "0 to 64" => |n| *n <= 64;
+                /// Reflectance (Imai16: Schlick's)
+                fresnel: Fresnel = Fresnel::Schlick, "", "schlick (Schlick's approximation) or exact" => |_| true;
+            }
+        }
+    };
+}
+pub(super) use walk_parameters;
+
 /// What a walk is told: the members of [`super::Optics`] that follow rays are such.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walk {

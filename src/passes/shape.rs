@@ -8,7 +8,7 @@ use crate::{
 };
 
 /// What becomes of particles, in the order of `glsl/shape.comp`.
-const COUNTED: [&str; 6] = [
+pub(crate) const COUNTED: [&str; 6] = [
     "splash",
     "body",
     "ellipsoid_few_neighbours",

@@ -113,12 +113,15 @@ impl DevicePositions {
 }
 
 /// What to do about a radius.
-pub(crate) const RADIUS_REMEDY: &str = "give half the rest spacing, in world units, from 1e-31 to 1e31";
+pub(crate) fn radius_remedy() -> String {
+    let (least, most) = (space::RADII.start(), space::RADII.end());
+    format!("give half the rest spacing, in world units, from {least:e} to {most:e}; scale the scene if need be")
+}
 
 impl From<PrepareError> for Error {
     fn from(e: PrepareError) -> Error {
         match e {
-            PrepareError::Radius(r) => Error::parameter("particle radius", r, RADIUS_REMEDY),
+            PrepareError::Radius(r) => Error::parameter("particle radius", r, radius_remedy()),
             PrepareError::Option { name, value, remedy } => Error::parameter(name, value, remedy),
             other => Error::parameter("particles", "", other.to_string()),
         }

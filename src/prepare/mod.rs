@@ -61,9 +61,7 @@ pub struct Report {
 #[allow(missing_docs)] // the fields are what the messages below say they are
 pub enum PrepareError {
     /// A radius outside of [`crate::space::RADII`].
-    #[error(
-        "particle radius {0:e}: give half the rest spacing, in world units, from 1e-31 to 1e31; scale the scene if need be"
-    )]
+    #[error("particle radius {0:e}: {remedy}", remedy = device::radius_remedy())]
     Radius(f32),
     /// An option out of its range.
     #[error("{name} is {value}: {remedy}")]

@@ -11,22 +11,39 @@ use crate::{
     shader::BILATERAL_COMP,
 };
 
-parameters! {
+/// The parameters of both bilateral filters.
+macro_rules! bilateral_parameters {
+    (
+        $(#[doc = $about:literal])+
+        pub struct $Name:ident, window to $widest:literal, $range:literal; iterations $iterations:literal, $often:literal
+    ) => {
+        parameters! {
+            $(#[doc = $about])+
+            pub struct $Name {
+                /// Largest edge of the window; ours
+                window: u32 = 55, "pixels", $range => |w| w % 2 == 1 && (3..=$widest).contains(w),
+                    enlarged |all, times| crate::smooth::edge(all.window, times, all.projected.then_some($widest));
+                /// Standard deviation of the weights across the image; ours, as wide as a particle (Truong18 compares with a
+                /// third of a reach of 0.5 radii). Rendered at n times the size, pixels are n times as many
+                sigma_space: f32 = 1.0, "particle radii" if projected else "pixels", "a finite value above 0"
+                    => |s| s.is_finite() && *s > 0.0,
+                    enlarged |all, times| if all.projected { all.sigma_space } else { all.sigma_space * times as f32 };
+                /// Standard deviation of the weights in depth; as Truong18 compares with
+                sigma_depth: f32 = 10.0 / 3.0, "particle radii", "a finite value above 0" => |s| s.is_finite() && *s > 0.0;
+                /// Whether sigma_space is a length at the pixel's depth, and the window three of it to either side; ours
+                projected: bool = true, "", "true or false" => |_| true;
+                #[doc = $often]
+                iterations: u32 = $iterations, "", "0 to 20" => |n| *n <= 20;
+            }
+        }
+    };
+}
+pub(super) use bilateral_parameters;
+
+bilateral_parameters! {
     /// The bilateral filter over a square window, iterated (Imai14). Imai16 §3.1 prints none of its numbers.
-    /// The depths' spread is what Truong18's program compares with; the image's is ours, as wide as a particle.
-    pub struct Bilateral {
-        /// Largest edge of the window
-        window: u32 = 55, "pixels", "an odd number from 3 to 55" => |w| w % 2 == 1 && (3..=55).contains(w);
-        /// Standard deviation of the weights across the image
-        sigma_space: f32 = 1.0, "particle radii, or pixels", "a finite value above 0"
-            => |s| s.is_finite() && *s > 0.0;
-        /// Standard deviation of the weights in depth
-        sigma_depth: f32 = 10.0 / 3.0, "particle radii", "a finite value above 0" => |s| s.is_finite() && *s > 0.0;
-        /// Whether sigma_space is a length at the pixel's depth, and the window three of it to either side
-        projected: bool = true, "", "true or false" => |_| true;
-        /// How often it is applied
-        iterations: u32 = 3, "", "0 to 20" => |n| *n <= 20;
-    }
+    pub struct Bilateral, window to 55, "an odd number from 3 to 55";
+    iterations 3, "How often it is applied; as Truong18 compares with"
 }
 
 impl Filter for Bilateral {

@@ -3,7 +3,7 @@
 #[cfg(feature = "inspect")]
 pub mod twin;
 
-use super::{Filter, alternate, per_pixel};
+use super::{Filter, alternate, bilateral::bilateral_parameters, per_pixel};
 use crate::{
     layers::Body,
     parameters::parameters,
@@ -11,22 +11,12 @@ use crate::{
     shader::{BILATERAL_SEPARABLE_COMP, IMAGE_GROUP},
 };
 
-parameters! {
-    /// The bilateral filter as if it were separable: rows, then columns (Green10, whose slides print no
-    /// numbers: these are the other bilateral filter's).
-    pub struct BilateralSeparable {
-        /// Largest edge of the window
-        window: u32 = 55, "pixels", "an odd number from 3 to 129" => |w| w % 2 == 1 && (3..=129).contains(w);
-        /// Standard deviation of the weights across the image
-        sigma_space: f32 = 1.0, "particle radii, or pixels", "a finite value above 0"
-            => |s| s.is_finite() && *s > 0.0;
-        /// Standard deviation of the weights in depth
-        sigma_depth: f32 = 10.0 / 3.0, "particle radii", "a finite value above 0" => |s| s.is_finite() && *s > 0.0;
-        /// Whether sigma_space is a length at the pixel's depth, and the window three of it to either side
-        projected: bool = true, "", "true or false" => |_| true;
-        /// How often rows and columns are filtered
-        iterations: u32 = 1, "", "0 to 20" => |n| *n <= 20;
-    }
+bilateral_parameters! {
+    /// The bilateral filter as if it were separable: rows, then columns (Green10, whose slides print no numbers: exp(-(x
+    /// blurScale)^2) and exp(-(rise blurDepthFalloff)^2), so that sigma is 1 / sqrt(2) over either; Im16 names such a
+    /// filter, and prints none either).
+    pub struct BilateralSeparable, window to 129, "an odd number from 3 to 129";
+    iterations 1, "How often rows and columns are filtered (Green10: once)"
 }
 
 impl Filter for BilateralSeparable {

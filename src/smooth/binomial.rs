@@ -3,7 +3,7 @@
 #[cfg(feature = "inspect")]
 pub mod twin;
 
-use super::{Filter, alternate, per_pixel};
+use super::{Filter, alternate, edge, per_pixel};
 use crate::{
     layers::Body,
     parameters::parameters,
@@ -12,17 +12,22 @@ use crate::{
 };
 use ash::vk::Format;
 
+/// Largest window.
+const WIDEST: u32 = 121;
+
 parameters! {
-    /// Binomial smoothing, rows then columns, drawn only where the smoothed silhouette is whole (Cords08).
+    /// Binomial smoothing, rows then columns, drawn only where the smoothed silhouette is whole (Cords08). A border as wide as
+    /// the kernel is cut off, and with it every droplet that is no larger.
     pub struct Binomial {
-        /// Pixels to either side
+        /// Pixels to either side: the splat's radius to begin with, to be varied by the user (Cords08 section 2.2)
         kernel: f32 = 1.0, "projected particle radii", "a finite value of at least 0"
             => |k| k.is_finite() && *k >= 0.0;
-        /// Largest edge of the window
-        window: u32 = 121, "pixels", "an odd number from 3 to 121" => |w| w % 2 == 1 && (3..=121).contains(w);
-        /// Whether only pixels are drawn at which the smoothed silhouette is still 1
+        /// Largest edge of the window; ours: the paper has no limit, and the weights of wider ones leave float32
+        window: u32 = WIDEST, "pixels", "an odd number from 3 to 121" => |w| w % 2 == 1 && (3..=WIDEST).contains(w),
+            enlarged |all, times| edge(all.window, times, Some(WIDEST));
+        /// Whether only pixels are drawn at which the smoothed silhouette is still 1, after the last iteration
         silhouette_map: bool = true, "", "true or false" => |_| true;
-        /// How often rows and columns are filtered
+        /// How often rows and columns are filtered (Cords08: once)
         iterations: u32 = 1, "", "0 to 20" => |n| *n <= 20;
     }
 }

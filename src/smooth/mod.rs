@@ -48,9 +48,24 @@ pub(crate) trait Filter {
     fn beside(&self, _step: u32) -> Option<&'static str> {
         None
     }
+    /// Where it leaves a depth as it is.
+    #[cfg(feature = "inspect")]
+    fn guards(&self) -> Option<Guards> {
+        None
+    }
     /// What one of these times, counted from 0, makes of the depths of one side: the same in 64 bits.
     #[cfg(feature = "inspect")]
     fn twin(&self, step: u32, input: &twin::Input) -> Vec<twin::Pixel>;
+}
+
+/// Where a filter leaves a depth as it is.
+#[cfg(feature = "inspect")]
+#[non_exhaustive]
+pub struct Guards {
+    /// Name and value of each limit, and whether it is a length in particle radii.
+    pub limits: Vec<(&'static str, f32, bool)>,
+    /// What they limit.
+    pub meaning: &'static str,
 }
 
 #[cfg(feature = "inspect")]
@@ -65,10 +80,22 @@ impl Smooth {
         self.member().beside(step)
     }
 
+    /// Where it leaves a depth as it is.
+    pub fn guards(&self) -> Option<Guards> {
+        self.member().guards()
+    }
+
     /// The CPU twin of one of these times, counted from 0.
     pub fn twin(&self, step: u32, input: &twin::Input) -> Vec<twin::Pixel> {
         self.member().twin(step, input)
     }
+}
+
+/// Edge of a window of pixels in a picture that is rendered at `times` its size: it covers the same part of it. A kernel that
+/// is projected grows with the picture by itself, and what only caps it ends with its own range.
+fn edge(window: u32, times: u32, cap: Option<u32>) -> u32 {
+    let wide = window.saturating_sub(1).saturating_mul(times).saturating_add(1);
+    cap.map_or(wide, |most| wide.min(most))
 }
 
 /// Takes the body's depths through so many steps, each from the target that the last one wrote to another; there are two

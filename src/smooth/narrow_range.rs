@@ -4,7 +4,7 @@
 #[cfg(feature = "inspect")]
 pub mod twin;
 
-use super::{Filter, alternate, per_pixel};
+use super::{Filter, alternate, edge, per_pixel};
 use crate::{
     layers::Body,
     parameters::{choices, parameters},
@@ -23,21 +23,25 @@ choices! {
     }
 }
 
+/// Largest window.
+const WIDEST: u32 = 201;
+
 parameters! {
     /// The narrow-range filter (Truong18); what the paper leaves open is as in its authors' own program.
     pub struct NarrowRange {
         /// What the window is
         shape: Shape = Shape::Separable, "", "separable (rows, columns, clean-up) or square" => |_| true;
-        /// Pixels to either side
+        /// Pixels to either side; the authors' program has a filter size of 5, by 0.1
         kernel: f32 = 0.5, "projected particle radii", "a finite value of at least 0"
             => |k| k.is_finite() && *k >= 0.0;
         /// Largest edge of the window
-        window: u32 = 201, "pixels", "an odd number from 3 to 201" => |w| w % 2 == 1 && (3..=201).contains(w);
-        /// How far beyond what is already in range a depth may lie
+        window: u32 = WIDEST, "pixels", "an odd number from 3 to 201" => |w| w % 2 == 1 && (3..=WIDEST).contains(w),
+            enlarged |all, times| edge(all.window, times, Some(WIDEST));
+        /// How far beyond what is already in range a depth may lie; the authors' program has 10.5
         threshold: f32 = 10.0, "particle radii", "a finite value above 0" => |t| t.is_finite() && *t > 0.0;
-        /// How far behind the pixel what is too far counts
+        /// How far behind the pixel what is too far counts (Truong18: mu = r)
         clamp: f32 = 1.0, "particle radii", "a finite value of at least 0" => |c| c.is_finite() && *c >= 0.0;
-        /// Whether no surface counts as too far (so Truong18), or not at all
+        /// Whether no surface counts as too far (so Truong18), or not at all (ours)
         empty_far: bool = false, "", "true or false" => |_| true;
         /// How often it is applied
         iterations: u32 = 3, "", "0 to 20" => |n| *n <= 20;

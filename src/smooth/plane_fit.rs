@@ -3,7 +3,7 @@
 #[cfg(feature = "inspect")]
 pub mod twin;
 
-use super::{Filter, alternate, per_pixel};
+use super::{Filter, alternate, edge, per_pixel};
 use crate::{
     layers::Body,
     method::Offers,
@@ -23,19 +23,23 @@ choices! {
     }
 }
 
+/// Largest window.
+const WIDEST: u32 = 25;
+
 parameters! {
     /// Iterative plane fitting (Imai16 §4.3).
     pub struct PlaneFit {
-        /// Edge of the window
-        window: u32 = 9, "pixels", "an odd number from 3 to 25" => |w| w % 2 == 1 && (3..=25).contains(w);
+        /// Edge of the window (Imai16 fig. 6: 9)
+        window: u32 = 9, "pixels", "an odd number from 3 to 25" => |w| w % 2 == 1 && (3..=WIDEST).contains(w),
+            enlarged |all, times| edge(all.window, times, all.projected.then_some(WIDEST));
         /// Whether the window is `width` wide at the pixel's depth, and `window` pixels at most: smoothing that does not
-        /// depend on zoom and resolution
+        /// depend on zoom and resolution. Ours: the paper's window is one of pixels
         projected: bool = false, "", "true or false" => |_| true;
-        /// Width of a projected window
+        /// Width of a projected window; ours
         width: f32 = 4.0, "particle radii", "a finite value of at least 0" => |w| w.is_finite() && *w >= 0.0;
-        /// How often planes are fitted
+        /// How often planes are fitted (Imai16: 2 for its waves, 5 for its steps and a million particles)
         iterations: u32 = 2, "", "0 to 20" => |n| *n <= 20;
-        /// Standard deviation of the weights, sigma of eq. (2)
+        /// Standard deviation of the weights, sigma of eq. (2) (Imai16 §4.3: 5.3 r)
         sigma: f32 = 5.3, "particle radii", "a finite value above 0"
             => |s| s.is_finite() && *s > 0.0;
         /// What weights are made of
@@ -86,6 +90,14 @@ impl Filter for PlaneFit {
     #[cfg(feature = "inspect")]
     fn steps(&self) -> u32 {
         self.iterations
+    }
+
+    #[cfg(feature = "inspect")]
+    fn guards(&self) -> Option<super::Guards> {
+        use crate::shader::{FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT};
+        let limits = vec![("grazing", FIT_GRAZING_LIMIT, false), ("update", FIT_UPDATE_LIMIT * self.sigma, true)];
+        let meaning = "the old depth is kept where |n.v| (v unit) is below `grazing` or the update exceeds `update`";
+        Some(super::Guards { limits, meaning })
     }
 
     #[cfg(feature = "inspect")]

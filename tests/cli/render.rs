@@ -190,3 +190,74 @@ fn an_environment_map_is_seen() {
     assert_eq!(&pixels[..3], &[255, 0, 0], "up is up");
     assert_eq!(&pixels[pixels.len() - 3..], &[0, 255, 0], "down is down");
 }
+
+/// What dumps hold stands in no list that a new target could be missing from: all that is written replaces an older dump.
+#[test]
+fn every_method_is_dumped() {
+    let run = Run::new();
+    let row: String = (0..40).map(|i| format!("{},0.1,0,{},0,0\n", 0.05 * f64::from(i), i)).collect();
+    let moving = run.file("moving.csv", format!("x,y,z,vx,vy,vz\n{row}"));
+    for (args, names) in [
+        (&["--method", "cords08", "--spray", "0.8"][..], &["speed", "body_front_missing_silhouette"][..]),
+        (&["--method", "imai14"], &["nearest_and_farthest", "body_back_depth_last_step"]),
+        (&["--method", "green10"], &["thickness", "body_front_depth_last_step"]),
+        (&[], &["front_tiles_nearest", "front_tiles_farthest", "body_front_depth_last_step", "body_back_depth"]),
+    ] {
+        run.render(&[&[&moving, "--radius", "0.05", "--dump", "d"], args].concat());
+        let mut files = listing(&run.path("d"));
+        assert!(names.iter().all(|n| files.contains(&format!("{n}.npy"))), "{args:?}: {files:?}");
+        let frame: serde_json::Value = serde_json::from_slice(&fs::read(run.path("d/frame.json")).unwrap()).unwrap();
+        let said = frame["files_of_this_dump"].as_array().expect("names");
+        files.sort_by_key(|name| said.iter().position(|s| s == name));
+        assert!(said.iter().eq(&files), "{said:?} {files:?}");
+    }
+}
+
+/// What is counted in pixels grows with the picture, and no published choice outgrows its range.
+#[test]
+fn every_preset_can_be_supersampled() {
+    let run = Run::new();
+    let block = run.file("block.csv", block(0.0));
+    for preset in meniscus::PRESETS {
+        let args =
+            ["--method", preset.name, "--size", "16x12", "--supersample", "3", "--radius", "0.05", "-o", "a.png"];
+        let output = run.command(&[&["render", &block], &args[..]].concat());
+        assert!(output.status.success(), "{}: {}", preset.name, crate::text(&output));
+    }
+}
+
+/// Where the near plane lies inside particles a dump says so, and does not take it for no liquid.
+#[test]
+fn dumps_keep_where_the_near_plane_cuts() {
+    let run = Run::new();
+    let block = run.file("block.csv", block(0.0));
+    run.render(
+        &[
+            &[&block, "--radius", "0.05", "--dump", "d", "--optics", "one"][..],
+            &["--eye", "0.2,0.2,0.2", "--target", "0.2,0.25,1"],
+        ]
+        .concat(),
+    );
+    let bytes = fs::read(run.path("d/body_front_depth_raw.npy")).expect("there");
+    let depths: Vec<f32> = npyz::NpyFile::new(&bytes[..]).expect("a map").into_vec().expect("floats");
+    let frame: serde_json::Value = serde_json::from_slice(&fs::read(run.path("d/frame.json")).unwrap()).unwrap();
+    let near = frame["near"].as_f64().expect("a length") as f32;
+    assert!(depths.iter().any(|d| *d < 0.0), "the eye is inside a particle");
+    assert!(depths.iter().all(|d| d.is_nan() || *d > 0.0 || (*d + near).abs() < 1e-6 * near), "-near");
+}
+
+/// A filter that leaves nothing is named; statistics of walks are none where optics do not walk.
+#[test]
+fn droplets_that_a_filter_cuts_away_are_told_from_none() {
+    let run = Run::new();
+    let three = run.file("three.csv", "x,y,z\n0,0,0\n1,0,0\n0.5,1,0\n");
+    let said = run.render(&[&three, "--radius", "0.05", "--method", "cords08", "--stats", "s.json"]);
+    assert!(said.contains("no liquid") && said.contains("filter binomial") && !said.contains("--radius"), "{said}");
+    let stats: serde_json::Value = serde_json::from_slice(&fs::read(run.path("s.json")).unwrap()).unwrap();
+    assert!(stats["patterns"].is_null() && stats["outcomes"].is_null(), "{stats}");
+    let guards = stats["guards"].as_object().expect("guards");
+    assert!(guards.contains_key("ellipsoid_degenerate") && !guards.contains_key("splash"), "{guards:?}");
+    assert!(!guards.contains_key("walk_normal_faced_the_wrong_way"), "{guards:?}");
+    let said = run.render(&[&three, "--radius", "0.05", "--method", "cords08", "--silhouette-map", "false"]);
+    assert!(!said.contains("no liquid"), "{said}");
+}

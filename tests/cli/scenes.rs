@@ -49,7 +49,7 @@ fn bench_measures_a_scene_file() {
     run.file("cloud.csv", block(0.0));
     run.file(
         "s.toml",
-        "particles = \"cloud.csv\"\nradius = 0.05\nsize = [64, 48]\n[settings.method.optics]\nname = \"one\"\n",
+        "particles = \"cloud.csv\"\nradius = 0.05\nsize = [32, 24]\nsupersample = 2\n[settings.method.optics]\nname = \"one\"\n",
     );
     let short = ["--frames", "1", "--warmup", "1"];
     let output = run.command(&[&["bench", "--scene", "s.toml", "-o", "b.json"], &short[..]].concat());
@@ -57,7 +57,12 @@ fn bench_measures_a_scene_file() {
     let figures: serde_json::Value =
         serde_json::from_slice(&fs::read(run.path("b.json")).expect("written")).expect("JSON");
     assert_eq!(figures["runs"][0]["settings"]["optics"], "one");
-    assert_eq!(figures["protocol"]["size"], serde_json::json!([64, 48]));
+    assert_eq!(figures["protocol"]["size"], serde_json::json!([32, 24]));
+    // As it is drawn: at twice the size, with windows that cover the same part of it.
+    assert_eq!(
+        (&figures["protocol"]["supersample"], &figures["runs"][0]["settings"]["window"]),
+        (&2.into(), &17.into())
+    );
 }
 
 #[test]

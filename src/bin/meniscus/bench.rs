@@ -50,8 +50,6 @@ impl Args {
     /// What is asked for, once for each method, and what the method is called.
     fn pictures(&self) -> Result<Vec<(String, Picture)>, Box<dyn std::error::Error>> {
         let mut base = self.options.base()?;
-        // Measured as it is drawn, once.
-        base.supersample = 1;
         base.prepare.get_or_insert(Prepare::Gpu);
         if self.methods.is_empty() {
             let picture = self.options.over(base, None)?;
@@ -140,6 +138,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
         )
         .into());
     }
+    let size = picture.rendered_size()?;
     let environment = picture.environment()?;
     args.show(&format!(
         "device: {} ({}); meniscus {} {}",
@@ -150,7 +149,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     ))?;
     let on_device = on(&device);
     let gpu = Gpu::new(&instance, device).map_err(|e| on_device(e.into()))?;
-    let mut session = Session::new(&gpu, picture.size, &environment).map_err(|e| on_device(e.into()))?;
+    let mut session = Session::new(&gpu, size, &environment).map_err(|e| on_device(e.into()))?;
     let runs = all(args, &pictures, &mut session);
     session.end();
     let runs = runs.map_err(on_device)?;
@@ -173,7 +172,7 @@ fn all(
     session: &mut Session,
 ) -> Result<Vec<Run>, Box<dyn std::error::Error>> {
     // They differ in their settings alone.
-    let (picture, place) = (&pictures[0].1, pictures[0].1.place());
+    let (picture, preparer) = (&pictures[0].1, pictures[0].1.preparer());
     let mut runs = Vec::new();
     let mut add = |name: String, scene: Scene| -> Result<(), Box<dyn std::error::Error>> {
         let begin = runs.len();
@@ -187,10 +186,10 @@ fn all(
     let own = picture.particles.iter().filter(|_| args.files.is_empty());
     let files: Vec<_> = args.files.iter().chain(own).collect();
     for file in &files {
-        add(file.display().to_string(), picture.load(Some(file), place)?)?;
+        add(file.display().to_string(), picture.load(Some(file), preparer)?)?;
     }
     if args.scenes || (files.is_empty() && !args.scaling) {
-        add("embedded dam break".into(), picture.load(None, place)?)?;
+        add("embedded dam break".into(), picture.load(None, preparer)?)?;
         add("block of 100,000".into(), Scene::synthetic(block(100_000), RADIUS, picture)?)?;
         add("20,000 droplets".into(), Scene::synthetic(droplets(20_000), RADIUS, picture)?)?;
     }
@@ -261,7 +260,7 @@ fn measure(
     let particles = &scene.particles;
     let (camera, eye, _) = picture.camera(scene)?;
     let settings = picture.frame_settings(particles)?;
-    let upload = scene.give(picture.place(), session)?;
+    let upload = scene.give(picture.preparer(), session)?;
     let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
     input.eye_inside = scene.inside(eye);
     input.positions = upload.as_ref().map(|u| scene.on_device(u));
@@ -275,7 +274,7 @@ fn measure(
         }
     }
     bar.finish_and_clear();
-    if let Some(why) = empty::explain(session, particles, &camera, picture.size)? {
+    if let Some(why) = empty::explain(session, particles, &camera, &settings, picture.rendered_size()?)? {
         terminal::complain(format!("meniscus: {name}: {why}"));
     }
     let total = |f: &FrameTimes, preparing: bool| {
@@ -286,7 +285,7 @@ fn measure(
         method: method.to_owned(),
         particles: scene.positions.len(),
         radius: scene.particles.radius,
-        prepare_cpu_ms: if picture.place().on_device() { 0.0 } else { scene.prepare_ms },
+        prepare_cpu_ms: if picture.preparer().on_device() { 0.0 } else { scene.prepare_ms },
         settings,
         passes: sums(&frames, |p| &p.name),
         parts: sums(&frames, |p| p.part),

@@ -65,7 +65,7 @@ impl Flag {
     fn help(&self) -> String {
         let mut lines: Vec<(String, Vec<String>)> = Vec::new();
         for (member, p) in &self.of {
-            let unit = if p.unit.is_empty() { String::new() } else { format!(", in {}", p.unit) };
+            let unit = if p.units.is_empty() { String::new() } else { format!(", in {}", p.units) };
             let range = if p.choices.is_empty() { format!(": {}", p.range) } else { String::new() };
             let open = if self.name == LEFT_OPEN { LEFT_OPEN_HELP } else { "" };
             let text = format!("{}{unit}{range}{open}", p.doc);
@@ -263,24 +263,24 @@ pub fn in_world(name: &str) -> String {
     format!("{name}_world")
 }
 
-/// The same windows in a picture that is rendered at a multiple of its size: they cover the same part of it.
-pub fn widen(settings: &mut Settings, times: u32) -> Result<(), Error> {
+/// Settings that make the same picture when it is rendered at a multiple of its size.
+pub fn enlarge(settings: &Settings, times: u32) -> Result<Settings, Error> {
     settings.validate()?;
-    let windows = settings.parameters().into_iter().filter(|p| p.unit == "pixels" && times > 1);
-    for p in windows {
-        let Ok(edge) = p.value.parse::<f64>() else { continue };
-        let wide = |edge: f64| (edge - 1.0) * f64::from(times) + 1.0;
-        let mut fits = |edge: f64| settings.set(p.name, &wide(edge).to_string()).and_then(|()| settings.validate());
-        if fits(edge).is_err() {
-            // One by one: what else the range asks for only it knows.
-            let most =
-                (1..100_000).map(|i| edge.ceil() - f64::from(i)).take_while(|e| *e >= 1.0).find(|e| fits(*e).is_ok());
-            let less = most.map_or("another --supersample".to_owned(), |most| format!("{most} at most"));
-            let remedy = format!("at --supersample {times} use {less} ({})", p.range);
-            return Err(Error::Parameter { parameter: p.name, value: p.value, remedy });
-        }
-    }
-    Ok(())
+    let enlarged = settings.enlarged(times);
+    let Err(refused) = enlarged.validate() else { return Ok(enlarged) };
+    let Error::Parameter { parameter, .. } = &refused else { return Err(refused) };
+    let Some(p) = settings.parameters().into_iter().find(|p| p.name == *parameter) else { return Err(refused) };
+    let mut other = *settings;
+    let mut fits = |value: f64| {
+        let set = other.set(p.name, &value.to_string()).and_then(|()| other.validate());
+        set.is_ok() && other.enlarged(times).validate().is_ok()
+    };
+    // One by one: what else the range asks for only it knows.
+    let given = p.value.parse::<f64>().unwrap_or(0.0).ceil();
+    let most = (1..100_000).map(|i| given - f64::from(i)).take_while(|v| *v >= 1.0).find(|v| fits(*v));
+    let less = most.map_or("another --supersample".to_owned(), |most| format!("{most} at most"));
+    let remedy = format!("at --supersample {times} use {less} ({})", p.range);
+    Err(Error::Parameter { parameter: p.name, value: p.value, remedy })
 }
 
 #[cfg(test)]
@@ -355,15 +355,42 @@ mod tests {
         }
     }
 
+    /// What is counted in pixels covers the same part of the picture; what only caps a kernel ends with its range.
     #[test]
     fn windows_widen_with_the_picture() {
-        let mut settings = Settings::default();
-        settings.set("window", "9").expect("set");
-        widen(&mut settings, 3).expect("fits");
-        assert_eq!(record(&settings)["window"], 25);
-        let mut settings = Settings::default();
-        settings.set("window", "11").expect("set");
-        let refused = widen(&mut settings, 3).expect_err("31 is too wide").to_string();
+        let large = |line: &str, times: u32| {
+            let mut settings = Settings::default();
+            parsed(line).expect("flags").apply(&mut settings, &mut Default::default(), None).expect("settings");
+            enlarge(&settings, times).map(|s| Value::Object(record(&s))).map_err(|e| e.to_string())
+        };
+        assert_eq!(large("--window 9", 3).expect("fits")["window"], 25);
+        let refused = large("--window 11", 3).expect_err("31 is too wide");
         assert!(refused.contains("window is 11") && refused.contains("9 at most"), "{refused}");
+        assert_eq!(large("--window 11 --projected true", 3).expect("a cap")["window"], 25);
+        for preset in PRESETS {
+            large(&format!("--method {}", preset.name), 3).expect(preset.name);
+        }
+        let wide = large("--smooth bilateral --projected false --sigma-space 4 --window 25", 2).expect("fits");
+        assert_eq!((&wide["window"], wide["sigma_space"].as_f64()), (&json!(49), Some(8.0)));
+        let cap = large("--smooth bilateral --sigma-space 4 --window 25", 3).expect("fits");
+        assert_eq!((&cap["window"], cap["sigma_space"].as_f64()), (&json!(55), Some(4.0)));
+        let flow = large("--smooth curvature-flow --time-step 0.5 --iterations 20", 2).expect("fits");
+        assert_eq!((&flow["time_step"], &flow["iterations"]), (&json!(0.25), &json!(80)));
+        let refused = large("--smooth curvature-flow --iterations 300", 2).expect_err("1200 are too many");
+        assert!(refused.contains("iterations is 300") && refused.contains("250 at most"), "{refused}");
+    }
+
+    /// A unit that hangs on another parameter is the one that holds.
+    #[test]
+    fn lengths_in_radii_are_known_wherever_they_are_such() {
+        let mut settings = Settings::default();
+        settings.method.choose("smooth", "bilateral").expect("a member");
+        assert_eq!(units(&settings)["sigma_space"], "particle radii");
+        assert_eq!(lengths(&settings, 0.5)["sigma_space_world"], 0.5);
+        settings.set("projected", "false").expect("set");
+        assert_eq!(units(&settings)["sigma_space"], "pixels");
+        assert!(!lengths(&settings, 0.5).contains_key("sigma_space_world"));
+        let flag = flags().into_iter().find(|f| f.name == "sigma_space").expect("a flag");
+        assert!(flag.help().contains("particle radii (if projected) or pixels"), "{}", flag.help());
     }
 }

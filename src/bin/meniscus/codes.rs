@@ -20,6 +20,6 @@ pub const OUTCOMES: &[(u32, &str)] = &[
     (s::OUTCOME_NOT_CONVERGED, "not converged"),
     (s::OUTCOME_REFLECTION_LIMIT, "limit of internal reflections"),
     (s::OUTCOME_PAST_JUMP, "past a jump: all surfaces found, but a map jumped on the way to one or beside it"),
-    (s::OUTCOME_OPPOSITE_WALL, "other wall: all surfaces found, one of them through the map behind the ray"),
+    (s::OUTCOME_OPPOSITE_WALL, "opposite wall: all surfaces found, one of them through the map behind the ray"),
     (s::OUTCOME_SCENE, "met the host's scene"),
 ];

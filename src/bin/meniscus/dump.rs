@@ -1,12 +1,12 @@
-//! `--dump`: every intermediate target as .npy, so that any pass can be recomputed from the dump alone.
+//! `--dump`: the frame's maps as .npy, so that what smooths them, walks in them and shades can be recomputed from the dump
+//! alone.
 
 use crate::{choices, codes, options, outputs::Dump, render::Job};
 use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     host::Session,
     inspect::{self, Spec, Walk},
-    shader::{SIDE_BACK, SIDE_FRONT},
-    smooth::Smooth,
+    shader::{FRONT_TILE, SIDE_BACK, SIDE_FRONT},
     space::Space,
     twin::normal::decode_normal,
 };
@@ -14,26 +14,49 @@ use npyz::WriterBuilder;
 use serde_json::{Value, json};
 use std::{collections::BTreeMap, error::Error, path::Path};
 
+/// Depths and normals of the body before they are smoothed.
+pub const RAY_CAST: [&str; 2] = ["body depth (ray-cast)", "body normal (ray-cast)"];
+
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
-    let out = Folder { dump: Dump::new(folder)?, size: job.size, radius: job.scene.particles.radius };
-    let surfaces = session.renderer.surfaces();
+    let mut out = Folder { dump: Dump::new(folder)?, size: job.size, radius: job.scene.particles.radius };
+    let (surfaces, radius) = (session.renderer.surfaces(), out.radius);
+    let [depth, normal] = RAY_CAST.map(Some);
+    // Steps of a filter write one of two targets in turns: the one without the result has what the last step read.
+    let mut smoothed = session.renderer.targets().into_iter().filter(|name| name.starts_with("body depth (smoothed"));
+    let before = smoothed.find(|name| Some(*name) != surfaces.body_depth);
     let targets = [
         ("splash", "_raw", surfaces.splash_depth, surfaces.splash_normal),
-        ("body", "_raw", Some("body depth (ray-cast)"), Some("body normal (ray-cast)")),
+        ("body", "_raw", depth, normal),
+        ("body", "_last_step", before, None),
         ("body", "", surfaces.body_depth, surfaces.body_normal),
     ];
-    for (class, raw, depth, normal) in targets {
+    for (class, step, depth, normal) in targets {
         for (side, layer) in [("front", SIDE_FRONT), ("back", SIDE_BACK)] {
             let mut words = |name: Option<&'static str>| name.map_or(Ok(None), |name| session.words(name, layer));
             let (Some(depths), normals) = (words(depth)?, words(normal)?) else { continue };
             let size = depth.map_or(job.size, |name| size_of_map(session, name));
-            out.maps(&format!("{class}_{side}"), raw, size, &depths, normals.as_deref())?;
+            out.maps(&format!("{class}_{side}"), step, size, &depths, normals.as_deref())?;
+        }
+    }
+    for (side, layer) in [("front", SIDE_FRONT), ("back", SIDE_BACK)] {
+        if let Some(words) = session.words("missing silhouette", layer)? {
+            let size = size_of_map(session, "missing silhouette");
+            out.array_of(&format!("body_{side}_missing_silhouette"), size, 1, floats(words).into_iter())?;
+        }
+    }
+    if let Some(words) = session.words("nearest and farthest depth", 0)? {
+        out.array("nearest_and_farthest", 2, words.into_iter().map(|w| f32::from_bits(w) * radius))?;
+    }
+    for (end, layer) in [("nearest", 0), ("farthest", 1)] {
+        if let Some(words) = session.words("front depth tiles", layer)? {
+            let depths = words.into_iter().map(|w| f32::from_bits(w) * radius);
+            out.array_of(&format!("front_tiles_{end}"), size_of_map(session, "front depth tiles"), 1, depths)?;
         }
     }
     if let Some(words) = session.words("thickness", 0)? {
-        out.array("thickness", 1, words.into_iter().map(|w| f32::from_bits(w) * out.radius))?;
+        out.array("thickness", 1, words.into_iter().map(|w| f32::from_bits(w) * radius))?;
     }
     if let Some(words) = session.words("speed", 0)? {
         out.array_of("speed", size_of_map(session, "speed"), 1, words.into_iter().map(f32::from_bits))?;
@@ -42,7 +65,7 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     if let Some(words) = session.words("walk (debug)", 0)? {
         let walk = floats(words);
         for (k, name) in ["pattern", "outcome", "hits", "path_length"].into_iter().enumerate() {
-            let unit = if name == "path_length" { out.radius } else { 1.0 };
+            let unit = if name == "path_length" { radius } else { 1.0 };
             out.array(name, 1, walk.chunks_exact(4).map(|w| w[k] * unit))?;
         }
     }
@@ -54,8 +77,7 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     if job.args.dump_neighbours {
         out.dump.write("neighbours.npz", &neighbours(job, session)?)?;
     }
-    out.dump.write("frame.json", serde_json::to_string_pretty(&frame(job))?.as_bytes())?;
-    Ok(out.dump.finish()?)
+    Ok(out.dump.finish(frame(job))?)
 }
 
 /// Maps of optics that upsample are smaller than the picture.
@@ -79,25 +101,34 @@ struct Folder<'a> {
 
 impl Folder<'_> {
     /// float32, H x W or H x W x `channels`, row 0 at the top.
-    fn array(&self, name: &str, channels: u64, data: impl Iterator<Item = f32>) -> Result<()> {
+    fn array(&mut self, name: &str, channels: u64, data: impl Iterator<Item = f32>) -> Result<()> {
         self.array_of(name, self.size, channels, data)
     }
 
-    fn array_of(&self, name: &str, size: [u32; 2], channels: u64, data: impl Iterator<Item = f32>) -> Result<()> {
+    fn array_of(&mut self, name: &str, size: [u32; 2], channels: u64, data: impl Iterator<Item = f32>) -> Result<()> {
         let [w, h] = size.map(u64::from);
         let shape: &[u64] = if channels == 1 { &[h, w] } else { &[h, w, channels] };
         Ok(self.dump.write(&format!("{name}.npy"), &npy(shape, data)?)?)
     }
 
-    fn maps(&self, surface: &str, raw: &str, size: [u32; 2], depths: &[u32], normals: Option<&[u32]>) -> Result<()> {
-        let depth = |w: &u32| Some(self.radius * f32::from_bits(*w)).filter(|d| *d > 0.0);
-        self.array_of(&format!("{surface}_depth{raw}"), size, 1, depths.iter().map(|w| depth(w).unwrap_or(f32::NAN)))?;
+    fn maps(
+        &mut self,
+        surface: &str,
+        step: &str,
+        size: [u32; 2],
+        depths: &[u32],
+        normals: Option<&[u32]>,
+    ) -> Result<()> {
+        let radius = self.radius;
+        let depth = |w: &u32| Some(radius * f32::from_bits(*w)).filter(|d| *d != 0.0).unwrap_or(f32::NAN);
+        self.array_of(&format!("{surface}_depth{step}"), size, 1, depths.iter().map(depth))?;
         let Some(normals) = normals else { return Ok(()) };
-        let normal = depths.iter().zip(normals).flat_map(|(d, n)| match depth(d) {
-            Some(_) => decode_normal(*n).to_array(),
-            None => [f32::NAN; 3],
+        // Where the near plane cuts the liquid there is no surface to have one.
+        let normal = depths.iter().zip(normals).flat_map(|(d, n)| match depth(d) > 0.0 {
+            true => decode_normal(*n).to_array(),
+            false => [f32::NAN; 3],
         });
-        self.array_of(&format!("{surface}_normal{raw}"), size, 3, normal)
+        self.array_of(&format!("{surface}_normal{step}"), size, 3, normal)
     }
 }
 
@@ -169,14 +200,6 @@ pub fn frame(job: &Job) -> Value {
     // In radii, whatever the origin.
     let block = inspect::uniforms(&job.camera, s, job.size, &Space::new(radius, Vec3::ZERO), bounds);
     let tolerance = meniscus::twin::search::Tolerance::of(&block);
-    let guards = match s.method.smooth {
-        Smooth::PlaneFit(p) => json!({
-            "grazing": meniscus::shader::FIT_GRAZING_LIMIT,
-            "update": meniscus::shader::FIT_UPDATE_LIMIT * p.sigma * radius,
-            "meaning": "the old depth is kept where |n.v| (v unit) is below `grazing` or the update exceeds `update`",
-        }),
-        _ => Value::Null,
-    };
     let walk = Walk::of(&s.method.optics);
     let mut frame = json!({
         "width": job.size[0],
@@ -192,7 +215,6 @@ pub fn frame(job: &Job) -> Value {
         "settings": choices::record(s),
         "units": choices::units(s),
         "asked": job.picture.record(),
-        "plane_fit_guards": guards,
         "refractions": walk.map(|w| w.refractions),
         "sampling": {
             "jump": radius * tolerance.jump,
@@ -204,6 +226,12 @@ pub fn frame(job: &Job) -> Value {
         "outcome_codes": codes(codes::OUTCOMES),
         "hits": "surfaces met on the walk, internal reflections included",
         "path_length": "length inside the liquid, all intervals, world units",
+        "depths": "along the view axis, world units; NaN: no surface; -near: the near plane lies inside a particle",
+        "smoothing": "`_raw`: before; `_last_step`: what the last step read; missing_silhouette: how much the row pass of the \
+                      last iteration missed",
+        "nearest_and_farthest": "before they are parted: the nearest front, negative (-inf: none), and the farthest back",
+        "front_tiles": format!("range of all front depths in each tile of {FRONT_TILE} x {FRONT_TILE} pixels; in an empty one \
+                               the nearest is beyond the farthest"),
         "normals": "eye space, outward: fronts towards the viewer, backs away from it",
         "particle_classes": {"0": "splash", "1": "body"},
         "command": options::command(),
@@ -212,6 +240,14 @@ pub fn frame(job: &Job) -> Value {
     let lengths = choices::lengths(s, radius);
     let plain = choices::record(s).into_iter().filter(|(name, _)| !lengths.contains_key(&choices::in_world(name)));
     if let Some(fields) = frame.as_object_mut() {
+        if let Some(guards) = s.method.smooth.guards() {
+            let limits = guards
+                .limits
+                .into_iter()
+                .map(|(name, limit, in_radii)| (name.to_owned(), json!(if in_radii { limit * radius } else { limit })));
+            let all = limits.chain([("meaning".to_owned(), json!(guards.meaning))]).collect();
+            fields.insert(format!("{}_guards", s.method.smooth.name().replace('-', "_")), Value::Object(all));
+        }
         plain.chain(lengths.clone()).for_each(|(name, value)| {
             fields.entry(name).or_insert(value);
         });

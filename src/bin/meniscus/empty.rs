@@ -1,8 +1,9 @@
 //! A picture without liquid, of a scene that has some: what may have gone wrong.
 
+use crate::dump::RAY_CAST;
 use glam::Vec3;
 use meniscus::{
-    Camera, Particles,
+    Camera, Particles, Settings,
     host::{HostError, Session},
     shader::{SIDE_BACK, SIDE_FRONT},
 };
@@ -12,20 +13,32 @@ pub fn explain(
     session: &mut Session,
     particles: &Particles,
     camera: &Camera,
+    settings: &Settings,
     size: [u32; 2],
 ) -> Result<Option<String>, HostError> {
     if particles.ellipsoids.is_empty() {
         return Ok(None);
     }
     let surfaces = session.renderer.surfaces();
-    let depths = [surfaces.body_depth, surfaces.splash_depth].into_iter().flatten();
-    for (name, side) in depths.flat_map(|name| [(name, SIDE_FRONT), (name, SIDE_BACK)]) {
-        let depths = session.words(name, side)?.unwrap_or_default();
-        if depths.iter().any(|w| f32::from_bits(*w) > 0.0) {
-            return Ok(None);
+    let mut covers = |name: Option<&'static str>| {
+        let mut pixels = 0;
+        for (name, side) in name.into_iter().flat_map(|name| [(name, SIDE_FRONT), (name, SIDE_BACK)]) {
+            let depths = session.words(name, side)?.unwrap_or_default();
+            pixels = pixels.max(depths.iter().filter(|w| f32::from_bits(**w) > 0.0).count());
         }
+        Ok::<_, HostError>(pixels)
+    };
+    if covers(surfaces.body_depth)? + covers(surfaces.splash_depth)? > 0 {
+        return Ok(None);
     }
-    let why = cause(particles, camera, size);
+    let why = match covers(Some(RAY_CAST[0]))? {
+        0 => cause(particles, camera, size),
+        pixels => format!(
+            "they cover {pixels} pixels, of which the filter {} (--smooth) leaves none. Change its parameters, or use another \
+             filter, such as --smooth none",
+            settings.method.smooth.name()
+        ),
+    };
     Ok(Some(format!("no liquid in the picture, of {} particles: {why}", particles.ellipsoids.len())))
 }
 

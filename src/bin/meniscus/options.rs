@@ -2,7 +2,7 @@
 
 use crate::{
     choices::{self, Choices},
-    picture::Picture,
+    picture::{Picture, SUPERSAMPLE},
     scene::Prepare,
     scene_file, terminal,
 };
@@ -10,47 +10,71 @@ use glam::DVec3;
 use meniscus::{Error, Parameters, Preset, io::Budget};
 use std::{fmt::Display, path::PathBuf};
 
+/// Options that take the place of what a picture has there: each with its flag, its type and its place.
+macro_rules! replacing {
+    ($($(#[$meta:meta])* $name:ident: $Type:ty => $($place:ident).+;)*) => {
+        #[derive(clap::Args)]
+        struct Replacing { $($(#[$meta])* $name: Option<$Type>,)* }
+
+        impl Replacing {
+            fn apply(&self, picture: &mut Picture) {
+                $(if let Some(given) = &self.$name {
+                    picture.$($place).+ = given.clone().into();
+                })*
+            }
+        }
+    };
+}
+
+replacing! {
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help = or("Width and height in pixels", size_text()))]
+    size: [u32; 2] => size;
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(SUPERSAMPLE),
+        help = or("Render at a multiple of the size and average", Picture::default().supersample))]
+    supersample: u32 => supersample;
+    /// Eye, in the file's coordinates; chosen to frame the liquid if not given
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    eye: DVec3 => camera.eye;
+    /// Point to look at; the middle of the liquid if not given
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    target: DVec3 => camera.target;
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true,
+        help = or("Up, for the camera and the environment", up_text()))]
+    up: DVec3 => camera.up;
+    #[arg(long, value_name = "DEG", help = or("Vertical field of view in degrees", Picture::default().camera.fov_y))]
+    fov_y: f32 => camera.fov_y;
+    /// Equirectangular environment map, .hdr, .exr or .png; a procedural sky if not given. One that is finer than the
+    /// picture's pixels, or too large for half of --max-memory, is averaged down
+    #[arg(long, value_name = "FILE")]
+    env: PathBuf => environment.file;
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, help = or(
+        "Turns the environment around up: counter-clockwise as seen from above", Picture::default().environment.rotation
+    ))]
+    env_rotate: f32 => environment.rotation;
+    /// Particle radius in world units; from the file, or estimated from spacing, if not given
+    #[arg(long, value_name = "R", allow_hyphen_values = true)]
+    radius: f64 => radius;
+    #[arg(long, value_name = "SIZE", help = or(
+        "Most memory that reading one file may take, with K, M, G or T. A small file may take less: 32 times its size and \
+         a 32nd of this", Picture::default().max_memory
+    ))]
+    max_memory: Budget => max_memory;
+    /// Where classes and ellipsoids are made; if not given, `render` does it on the CPU and `bench` on the device
+    #[arg(long, value_enum)]
+    prepare: Prepare => prepare;
+}
+
 /// What is drawn, from where, how, and on what. What is not given is as the scene file has it, or as by default.
 #[derive(clap::Args)]
 pub struct Options {
     /// Scene file (TOML, as `render --save-scene` writes it); other options come before what it says
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
-    #[arg(long, value_name = "WxH", value_parser = parse_size, help = or("Width and height in pixels", size_text()))]
-    size: Option<[u32; 2]>,
-    /// Eye, in the file's coordinates; chosen to frame the liquid if not given
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
-    eye: Option<DVec3>,
-    /// Point to look at; the middle of the liquid if not given
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
-    target: Option<DVec3>,
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true,
-        help = or("Up, for the camera and the environment", up_text()))]
-    up: Option<DVec3>,
-    #[arg(long, value_name = "DEG", help = or("Vertical field of view in degrees", Picture::default().camera.fov_y))]
-    fov_y: Option<f32>,
-    /// Equirectangular environment map, .hdr, .exr or .png; a procedural sky if not given. One that is finer than the
-    /// picture's pixels, or too large for half of --max-memory, is averaged down
-    #[arg(long, value_name = "FILE")]
-    env: Option<PathBuf>,
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, help = or(
-        "Turns the environment around up: counter-clockwise as seen from above", Picture::default().environment.rotation
-    ))]
-    env_rotate: Option<f32>,
-    /// Particle radius in world units; from the file, or estimated from spacing, if not given
-    #[arg(long, value_name = "R", allow_hyphen_values = true)]
-    radius: Option<f64>,
-    #[arg(long, value_name = "SIZE", help = or(
-        "Most memory that reading one file may take, with K, M, G or T. A small file may take less: 32 times its size and \
-         a 32nd of this", Picture::default().max_memory
-    ))]
-    max_memory: Option<Budget>,
+    #[command(flatten)]
+    replacing: Replacing,
     /// Drop particles whose position is not finite instead of failing
     #[arg(long)]
     drop_invalid: bool,
-    /// Where classes and ellipsoids are made; if not given, `render` does it on the CPU and `bench` on the device
-    #[arg(long, value_enum)]
-    prepare: Option<Prepare>,
     /// Device whose name or driver contains this; the best one if not given
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
@@ -59,7 +83,7 @@ pub struct Options {
 }
 
 /// Help for an option whose default is not the parser's.
-pub fn or(help: &str, default: impl Display) -> String {
+fn or(help: &str, default: impl Display) -> String {
     format!("{help} [default: {default}]")
 }
 
@@ -86,13 +110,6 @@ fn parse_vector(s: &str) -> Result<DVec3, String> {
     }
 }
 
-/// Puts what was given in the place of what was there.
-fn replace<T: Clone>(place: &mut T, given: &Option<T>) {
-    if let Some(given) = given {
-        place.clone_from(given);
-    }
-}
-
 impl Options {
     /// The scene file's picture, or the default one.
     pub fn base(&self) -> Result<Picture, scene_file::SceneFileError> {
@@ -101,16 +118,7 @@ impl Options {
 
     /// A picture with what these options say of it; a method may take the place of theirs.
     pub fn over(&self, mut picture: Picture, method: Option<&Preset>) -> Result<Picture, Error> {
-        replace(&mut picture.size, &self.size);
-        replace(&mut picture.camera.eye, &self.eye.map(Some));
-        replace(&mut picture.camera.target, &self.target.map(Some));
-        replace(&mut picture.camera.up, &self.up);
-        replace(&mut picture.camera.fov_y, &self.fov_y);
-        replace(&mut picture.environment.file, &self.env.clone().map(Some));
-        replace(&mut picture.environment.rotation, &self.env_rotate);
-        replace(&mut picture.radius, &self.radius.map(Some));
-        replace(&mut picture.max_memory, &self.max_memory);
-        replace(&mut picture.prepare, &self.prepare.map(Some));
+        self.replacing.apply(&mut picture);
         picture.drop_invalid |= self.drop_invalid;
         picture.absorption_given |= self.choices.gives(choices::LEFT_OPEN);
         self.choices.apply(&mut picture.settings, &mut picture.preparation, method)?;

@@ -6,6 +6,7 @@ use crate::{
     terminal,
 };
 use same_file::{Handle, is_same_file};
+use serde_json::{Value, json};
 use std::{
     fs,
     io::{self, ErrorKind, Write},
@@ -158,29 +159,19 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     }
 }
 
-/// Files of a dump, but for the maps.
-const DUMPED: [&str; 10] = [
-    "thickness.npy",
-    "pattern.npy",
-    "outcome.npy",
-    "hits.npy",
-    "path_length.npy",
-    "final_direction.npy",
-    "color_linear.npy",
-    "particles.npz",
-    "neighbours.npz",
-    FRAME,
-];
-/// In every dump, and known by its codes.
+/// In every dump: what it is of, and among that the dump's files.
 const FRAME: &str = "frame.json";
-const MARK: &str = "\"pattern_codes\"";
-/// How the maps' names begin.
-const MAPS: [&str; 4] = ["splash_front_", "splash_back_", "body_front_", "body_back_"];
+const FILES: &str = "files_of_this_dump";
 
-/// Whether a dump may hold a file of this name.
-fn dumped(name: &str) -> bool {
-    let map = |rest: &str| matches!(rest, "depth.npy" | "normal.npy" | "depth_raw.npy" | "normal_raw.npy");
-    DUMPED.contains(&name) || MAPS.iter().any(|m| name.strip_prefix(m).is_some_and(map))
+/// Files of the dump in a folder, as it says itself: none where there is no dump; nothing where what says so is no dump's.
+fn files_of_dump(place: &Path) -> Option<Vec<String>> {
+    let text = match fs::read(place.join(FRAME)) {
+        Ok(text) => text,
+        Err(e) => return (e.kind() == ErrorKind::NotFound).then(Vec::new),
+    };
+    let frame: Value = serde_json::from_slice(&text).ok()?;
+    let names = frame.get(FILES)?.as_array()?.iter();
+    names.map(|name| name.as_str().map(str::to_owned)).collect()
 }
 
 /// Refuses to replace a folder that is neither empty nor a dump.
@@ -189,19 +180,16 @@ fn check_dump(folder: &Path, place: &Path) -> Result<(), OutputError> {
     if !place.exists() {
         return Ok(());
     }
-    let mut empty = true;
-    for entry in fs::read_dir(place).map_err(failed(folder))? {
+    let entries = fs::read_dir(place).map_err(failed(folder))?;
+    let Some(files) = files_of_dump(place) else { return no_dump(format!("a {FRAME} that is no dump's")) };
+    for entry in entries {
         let entry = entry.map_err(failed(folder))?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        if !dumped(&name) || !entry.file_type().is_ok_and(|t| t.is_file()) {
+        if !files.contains(&name) || !entry.file_type().is_ok_and(|t| t.is_file()) {
             return no_dump(format!("\"{name}\""));
         }
-        empty = false;
     }
-    if empty || fs::read_to_string(place.join(FRAME)).is_ok_and(|text| text.contains(MARK)) {
-        return Ok(());
-    }
-    no_dump(format!("no {FRAME} of a dump"))
+    Ok(())
 }
 
 /// A dump in the making.
@@ -210,21 +198,25 @@ pub struct Dump<'a> {
     name: &'a Path,
     place: PathBuf,
     folder: Folder,
+    files: Vec<String>,
 }
 
 impl<'a> Dump<'a> {
     pub fn new(name: &'a Path) -> Result<Dump<'a>, OutputError> {
         let place = resolve(name)?;
-        Ok(Dump { name, folder: Folder::new(&place).map_err(failed(name))?, place })
+        Ok(Dump { name, folder: Folder::new(&place).map_err(failed(name))?, place, files: Vec::new() })
     }
 
-    pub fn write(&self, file: &str, bytes: &[u8]) -> Result<(), OutputError> {
-        assert!(dumped(file), "{file} is missing among the names of a dump");
+    pub fn write(&mut self, file: &str, bytes: &[u8]) -> Result<(), OutputError> {
+        self.files.push(file.to_owned());
         self.folder.write(file, bytes).map_err(failed(&self.name.join(file)))
     }
 
-    /// It is whole: takes its name, and the place of an older dump.
-    pub fn finish(self) -> Result<(), OutputError> {
+    /// It is whole but for what it is of: takes its name, and the place of an older dump.
+    pub fn finish(mut self, mut frame: Value) -> Result<(), OutputError> {
+        let files = self.files.iter().map(String::as_str).chain([FRAME]).collect::<Vec<_>>();
+        frame[FILES] = json!(files);
+        self.write(FRAME, format!("{frame:#}").as_bytes())?;
         // Rendering takes a while; someone may have put something there.
         check_dump(self.name, &self.place)?;
         self.folder.finish().map_err(failed(self.name))

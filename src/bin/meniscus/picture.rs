@@ -129,7 +129,7 @@ impl Picture {
     }
 
     /// Where particles are prepared.
-    pub fn place(&self) -> Prepare {
+    pub fn preparer(&self) -> Prepare {
         self.prepare.unwrap_or(Prepare::Cpu)
     }
 
@@ -166,17 +166,22 @@ impl Picture {
         if !self.absorption_given {
             let (low, high) = particles.bounds().unwrap_or((Vec3::splat(-1.0), Vec3::splat(1.0)));
             // In double precision, which the square of no length overflows.
-            let share = (1.2 / (high - low).as_dvec3().length()) as f32;
-            settings.liquid.absorption = Vec3::new(1.0, 0.35, 0.2) * share;
+            let per_length = (1.2 / (high - low).as_dvec3().length()) as f32;
+            settings.liquid.absorption = Vec3::new(1.0, 0.35, 0.2) * per_length;
         }
         settings
     }
 
     /// Settings of the frame that is rendered.
     pub fn frame_settings(&self, particles: &Particles) -> Result<Settings, Error> {
-        let mut settings = self.settings(particles);
-        choices::widen(&mut settings, self.supersample)?;
-        Ok(settings)
+        choices::enlarge(&self.settings(particles), self.supersample)
+    }
+
+    /// Size rendered at: the picture's times the supersampling.
+    pub fn rendered_size(&self) -> Result<[u32; 2], &'static str> {
+        let [width, height] = self.size.map(|edge| edge.checked_mul(self.supersample));
+        let both = width.zip(height).ok_or("--size times --supersample is too large: use a smaller one of them")?;
+        Ok(both.into())
     }
 
     /// By name, for whoever wants to repeat it.

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3, Mat3, Vec3};
 use meniscus::{
     Ellipsoid, Particles,
     host::{HostError, Session},
+    inspect,
     prepare::{Report, ellipsoids::eigen_symmetric},
     shader as s,
     space::Space,
@@ -48,16 +49,7 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     }
     let splash_count = splash.len();
     let (ellipsoids, index) = splash.into_iter().chain(body).unzip();
-    let counters = session.counters()?;
-    let count = |name: &str| counters.iter().find(|c| c.0 == name).map_or(0, |c| c.1 as usize);
-    let report = Report {
-        splash: count("splash"),
-        body: count("body"),
-        few_neighbours: count("ellipsoid_few_neighbours"),
-        degenerate: count("ellipsoid_degenerate"),
-        clamped_long: count("ellipsoid_clamped_long"),
-        clamped_ratio: count("ellipsoid_clamped_ratio"),
-    };
+    let report = inspect::report(&session.counters()?);
     Ok(Prepared { particles: Particles { radius, ellipsoids, splash_count }, report, index })
 }
 
@@ -71,24 +63,24 @@ fn order(session: &mut Session, particles: usize) -> Result<Vec<u32>, HostError>
 }
 
 /// What the device lists of so many particles' neighbours, and how many words of it are each one's.
-fn shares(session: &mut Session, particles: usize) -> Result<(Vec<u32>, usize), HostError> {
+fn lists(session: &mut Session, particles: usize) -> Result<(Vec<u32>, usize), HostError> {
     let words = session.words("neighbours (debug)", 0)?.unwrap_or_default();
-    let share = words.len() / particles.max(1);
-    Ok((words, share.max(1)))
+    let each = words.len() / particles.max(1);
+    Ok((words, each.max(1)))
 }
 
 /// The most neighbours that a particle has, whether or not there was room to list them.
 pub fn most_neighbours(session: &mut Session, particles: usize) -> Result<u32, HostError> {
-    let (words, share) = shares(session, particles)?;
-    Ok(words.chunks_exact(share).map(|list| list[1]).max().unwrap_or(0))
+    let (words, each) = lists(session, particles)?;
+    Ok(words.chunks_exact(each).map(|list| list[1]).max().unwrap_or(0))
 }
 
 /// Neighbours of every position, in the order of the input: where each one's begin (one entry more than there are
 /// positions), and their indices, ascending.
 pub fn neighbours(session: &mut Session, particles: usize) -> Result<(Vec<u64>, Vec<u32>), HostError> {
-    let (words, share) = shares(session, particles)?;
-    let mut lists = vec![Vec::new(); words.len() / share];
-    for list in words.chunks_exact(share) {
+    let (words, each) = lists(session, particles)?;
+    let mut lists = vec![Vec::new(); words.len() / each];
+    for list in words.chunks_exact(each) {
         let (index, number) = (list[0] as usize, list[1] as usize);
         lists[index] = list[2..][..number].to_vec();
         lists[index].sort_unstable();

@@ -2,9 +2,9 @@
 
 use crate::{
     dump, empty, on,
-    options::{Options, or},
+    options::Options,
     outputs,
-    picture::{Picture, SUPERSAMPLE},
+    picture::Picture,
     prepared::{self, Prepared},
     scene::{Prepare, Scene, spinner},
     scene_file, stats, terminal,
@@ -28,16 +28,13 @@ pub struct Args {
     pub output: PathBuf,
     #[command(flatten)]
     pub options: Options,
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(SUPERSAMPLE),
-        help = or("Render at a multiple of the size and average", Picture::default().supersample))]
-    pub supersample: Option<u32>,
     /// Write all that decides the picture as a scene file (TOML): `render --scene FILE` makes it again
     #[arg(long, value_name = "FILE")]
     pub save_scene: Option<PathBuf>,
     /// Write timings, memory, counts and parameters as JSON
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
-    /// Write every intermediate target as .npy into this folder; an older dump in it is replaced
+    /// Write the frame's maps as .npy, its particles and all that recomputing them takes into this folder; an older dump in it is replaced
     #[arg(long, value_name = "DIR")]
     pub dump: Option<PathBuf>,
     /// With --dump and --prepare gpu: also write every particle's neighbours (four bytes of device memory for each)
@@ -53,7 +50,6 @@ impl Args {
     fn picture(&self) -> Result<Picture, Box<dyn std::error::Error>> {
         let mut picture = self.options.over(self.options.base()?, None)?;
         picture.particles = self.file.clone().or(picture.particles);
-        picture.supersample = self.supersample.unwrap_or(picture.supersample);
         picture.prepare.get_or_insert(Prepare::Cpu);
         Ok(picture)
     }
@@ -69,7 +65,7 @@ impl Args {
         inputs.extend(picture.particles.as_deref().map(|p| ("the particle file", p)));
         inputs.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
         outputs::check(&outputs, self.dump.as_deref(), &inputs)?;
-        if self.dump_neighbours && !picture.place().on_device() {
+        if self.dump_neighbours && !picture.preparer().on_device() {
             return Err("--dump-neighbours lists what the device finds: add --prepare gpu".into());
         }
         Ok(())
@@ -87,7 +83,7 @@ pub struct Job<'a> {
     pub camera: Camera,
     pub eye: Vec3,
     pub settings: Settings,
-    /// Size rendered at: the picture's times the supersampling.
+    /// Size rendered at.
     pub size: [u32; 2],
     pub eye_inside: bool,
 }
@@ -109,7 +105,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     let environment = picture.environment()?;
     let instance = Instance::new(args.validate)?;
     let device = instance.pick(args.options.device.as_deref())?;
-    let scene = picture.load(picture.particles.as_deref(), picture.place())?;
+    let scene = picture.load(picture.particles.as_deref(), picture.preparer())?;
     announce(&scene, &device.name, &device.driver);
     let mut job = plan(args, picture, &scene)?;
     let on_device = on(&device);
@@ -152,11 +148,7 @@ fn announce(scene: &Scene, device: &str, driver: &str) {
 fn plan<'a>(args: &'a Args, picture: Picture, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::error::Error>> {
     let (camera, eye, view) = picture.camera(scene)?;
     let settings = picture.frame_settings(&scene.particles)?;
-    let times = |edge: u32| {
-        let wide = edge.checked_mul(picture.supersample);
-        wide.ok_or("--size times --supersample is too large: use a smaller one of them")
-    };
-    let size = [times(picture.size[0])?, times(picture.size[1])?];
+    let size = picture.rendered_size()?;
     let picture = Picture {
         radius: Some(shortest(scene.particles.radius)),
         camera: view,
@@ -175,7 +167,7 @@ fn shortest(value: f32) -> f64 {
 
 /// Renders and writes everything; says so if the picture shows none of the liquid.
 fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dyn std::error::Error>> {
-    let upload = job.scene.give(job.picture.place(), session)?;
+    let upload = job.scene.give(job.picture.preparer(), session)?;
     let (camera, settings) = (job.camera, job.settings);
     // The session has a canvas of its own.
     let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
@@ -192,7 +184,7 @@ fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dy
     if let Some(path) = &job.args.save_scene {
         outputs::write(path, scene_file::text(&job.picture, path)?.as_bytes())?;
     }
-    let no_liquid = empty::explain(session, &job.scene.particles, &camera, job.size)?;
+    let no_liquid = empty::explain(session, &job.scene.particles, &camera, &settings, job.size)?;
     if job.args.dump.is_none() && job.args.stats.is_none() {
         return Ok(no_liquid);
     }
@@ -209,7 +201,7 @@ fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dy
             session.frame(&input)?;
         }
     }
-    if job.picture.place().on_device() {
+    if job.picture.preparer().on_device() {
         job.prepared = Some(prepared::read(session, job.scene.particles.radius)?);
     }
     if let Some(folder) = &job.args.dump {

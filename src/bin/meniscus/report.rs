@@ -25,11 +25,11 @@ pub fn check_extension(path: &Path) -> Result<(), String> {
     }
 }
 
-/// Value below which a share of the sorted times lies, by linear interpolation.
-fn quantile(times: &[f64], share: f64) -> f64 {
+/// Value below which a fraction of the sorted times lies, by linear interpolation.
+fn quantile(times: &[f64], fraction: f64) -> f64 {
     let mut sorted = times.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let at = share * (sorted.len() - 1) as f64;
+    let at = fraction * (sorted.len() - 1) as f64;
     let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
     low + (high - low) * at.fract()
 }
@@ -50,7 +50,7 @@ fn rows(run: &Run) -> Vec<(String, Vec<f64>)> {
 }
 
 pub fn print(run: &Run, args: &Args, picture: &Picture) -> Result<(), NotWritten> {
-    let on_device = picture.place().on_device();
+    let on_device = picture.preparer().on_device();
     args.show("")?;
     args.show(&format!(
         "{}, {}: {} particles, {:.1} bytes of device memory each, {:.1} MB in all",
@@ -62,7 +62,7 @@ pub fn print(run: &Run, args: &Args, picture: &Picture) -> Result<(), NotWritten
     ))?;
     args.show(&format!("{:<34} {:>10} {:>10} {:>10}  ms", "pass", "median", "p5", "p95"))?;
     for (name, times) in rows(run) {
-        let ms = [0.5, 0.05, 0.95].map(|share| quantile(&times, share));
+        let ms = [0.5, 0.05, 0.95].map(|fraction| quantile(&times, fraction));
         args.show(&format!("{name:<34} {:>10.3} {:>10.3} {:>10.3}", ms[0], ms[1], ms[2]))?;
     }
     if !on_device {
@@ -178,7 +178,7 @@ fn table(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> R
     csv.write_record(heads.chain(asked.iter().map(|(name, _)| name.clone())).chain(parameters.iter().map(units)))?;
     for run in runs {
         for (name, times) in rows(run) {
-            let ms = |share| format!("{:.6}", quantile(&times, share));
+            let ms = |fraction| format!("{:.6}", quantile(&times, fraction));
             let row = [
                 run.scene.clone(),
                 run.method.clone(),
@@ -187,7 +187,7 @@ fn table(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> R
                 ms(0.5),
                 ms(0.05),
                 ms(0.95),
-                format!("{:.3}", run.bytes_per_particle(picture.place().on_device())),
+                format!("{:.3}", run.bytes_per_particle(picture.preparer().on_device())),
                 args.frames.to_string(),
                 args.warmup.to_string(),
                 device.name.clone(),
@@ -206,7 +206,7 @@ fn table(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> R
 
 /// JSON: everything.
 fn tree(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> Result<Vec<u8>, Box<dyn Error>> {
-    let on_device = picture.place().on_device();
+    let on_device = picture.preparer().on_device();
     let medians = |of: &[(String, Vec<f64>)]| of.iter().map(|(n, t)| (n.clone(), figures(t))).collect::<Map<_, _>>();
     let each: Vec<_> = runs
         .iter()
@@ -239,8 +239,9 @@ fn tree(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> Re
             "frames": args.frames,
             "warmup": args.warmup,
             "size": picture.size,
+            "supersample": picture.supersample,
             "seed": SEED,
-            "prepare": picture.place().name(),
+            "prepare": picture.preparer().name(),
             "asked": picture.record_rest(),
             "not_asked": "eye and target that are null frame the liquid; radius that is null is the file's or estimated",
             "validation": false,

@@ -129,10 +129,10 @@ impl Scene {
 
     /// Positions that were made, not read.
     pub fn synthetic(positions: Vec<Vec3>, radius: f32, picture: &Picture) -> Result<Scene, Box<dyn Error>> {
-        let place = picture.place();
-        let options = Options { search: place.search(picture.preparation.search), ..picture.preparation };
+        let prepare = picture.preparer();
+        let options = Options { search: prepare.search(picture.preparation.search), ..picture.preparation };
         let input = Input { positions: &positions, radius, classes: None, ellipsoids: None };
-        let (particles, report, speeds, prepare_ms) = make(&input, None, &options, place)?;
+        let (particles, report, speeds, prepare_ms) = make(&input, None, &options, prepare)?;
         Ok(Scene {
             particles,
             report,
@@ -148,8 +148,8 @@ impl Scene {
     }
 
     /// Gives its particles to the renderer or, where the device prepares them, its positions in a buffer.
-    pub fn give<'a>(&self, place: Prepare, session: &mut Session<'a>) -> Result<Option<Upload<'a>>, Box<dyn Error>> {
-        if place.on_device() {
+    pub fn give<'a>(&self, prepare: Prepare, session: &mut Session<'a>) -> Result<Option<Upload<'a>>, Box<dyn Error>> {
+        if prepare.on_device() {
             return Ok(Some(Upload::new(session.gpu, bytemuck::cast_slice(&self.positions))?));
         }
         session.renderer.set_particles(&self.particles)?;
@@ -177,12 +177,12 @@ type Made = (Particles, Report, Option<Vec<f32>>, f64);
 
 /// Particles as the CPU prepares them, or what is known before the device does; how fast they are; and the
 /// milliseconds that it took.
-fn make(input: &Input, velocities: Option<&[Vec3]>, options: &Options, place: Prepare) -> Result<Made, Box<dyn Error>> {
+fn make(input: &Input, velocities: Option<&[Vec3]>, options: &Options, how: Prepare) -> Result<Made, Box<dyn Error>> {
     let bar = progress(input.positions.len() as u64, "classes and ellipsoids");
     let start = std::time::Instant::now();
     let progress = |done| bar.set_position(done as u64);
     let (particles, report, speeds) = match velocities {
-        _ if place.on_device() => (uniform(input, options), Report::default(), None),
+        _ if how.on_device() => (uniform(input, options), Report::default(), None),
         Some(velocities) => {
             let (particles, report, speeds) = prepare::prepare_with_velocities(input, velocities, options, &progress)?;
             (particles, report, Some(speeds))
