@@ -7,8 +7,11 @@
 // Size of a compute group of particles.
 #define PARTICLE_GROUP 64
 
-// Edge of a tile of front depths, in pixels.
-#define FRONT_TILE 16
+// Edge of a tile of walls, in pixels; a power of two, and which.
+#define WALL_TILE 8
+#define WALL_TILE_BITS 3
+// Depth of what is not there.
+#define FARTHEST 1.0e30
 
 // Classes (Imai16 section 4.1) and sides: the layer of a two-layer map.
 #define CLASS_SPLASH 0
@@ -28,23 +31,20 @@
 // How a pixel's walk ended.
 // No particle covers the pixel.
 #define OUTCOME_NO_LIQUID 0
-// Every surface was found where a ray would meet it.
+// Every wall that the ray met was a surface or a ball.
 #define OUTCOME_HIT 1
-// The ray crossed the border of the view inside the liquid, or looking for a second volume.
-#define OUTCOME_LEFT_VIEW 2
-// The map ahead ended, or jumped, where the ray would leave the liquid.
-#define OUTCOME_HOLE 3
-// MARCH_STEPS did not reach the end of the ray.
-#define OUTCOME_NOT_CONVERGED 4
+// The walk is complete, and one of its walls was a side wall.
+#define OUTCOME_SIDE_WALL 2
+// The ray left the view, or came before the near plane, inside the liquid or looking for a second volume.
+#define OUTCOME_LEFT_VIEW 3
+// The ray left the box around what is drawn inside the liquid.
+#define OUTCOME_NO_WALL 4
+// MARCH_STEPS, or another limit of steps, did not reach the end of the ray.
+#define OUTCOME_NOT_CONVERGED 5
 // One more internal reflection than a walk may have.
-#define OUTCOME_REFLECTION_LIMIT 5
-// Every surface was found, but the map jumped before one of the hits, or within its footprint: a wall that no map holds may
-// stand before it.
-#define OUTCOME_PAST_JUMP 6
-// Every surface was found, one of them on the map of the side that the ray runs away from.
-#define OUTCOME_OPPOSITE_WALL 7
+#define OUTCOME_REFLECTION_LIMIT 6
 // The ray ended on the host's scene.
-#define OUTCOME_SCENE 8
+#define OUTCOME_SCENE 7
 
 // Which particles a class draws on which side; bits of the cull pass's verdict.
 #define VISIBLE_FRONT 1
@@ -106,44 +106,35 @@
 // The longest update of a depth that is taken, in sigma.
 #define FIT_UPDATE_LIMIT 4.0
 
-// Searches along a ray (search.glsl). Steps of the secant method towards an exit.
-#define SECANT_STEPS 10
-// After the secant method: pixels between two looks for an earlier wall, at least.
-#define CHECK_PIXELS 1.0
-// ... and at most.
-#define CHECK_STRIDE 8.0
-// Looks, at most.
-#define CHECK_STEPS 64
-// Entry: pixels between two samples within a pixel whose front surface is near the ray.
-#define ENTRY_PIXELS 0.125
-// Samples within a pixel, at most.
-#define ENTRY_STEPS 12
-// How far into the next pixel or tile a position is taken that lies on the edge between two, in pixels.
+// Search for walls along a ray (walls.glsl). How far into the next pixel or tile a position is taken that lies on the edge between
+// two, in pixels.
 #define PIXEL_NUDGE 0.001
-// March to an exit: pixels between two samples near a wall.
-#define EXIT_PIXELS 1.0
-// ... and far from any.
-#define EXIT_STRIDE 16.0
-// Steps of a march, at most.
+// How far beyond the box around what is drawn rays are followed, in particle radii.
+#define BOX_MARGIN 2.0
+// How far beside a side wall a ray goes on, in pixels: it lies on the border between two.
+#define SIDE_NUDGE 0.01
+// Tiles and pixels that are looked at before a wall may be met, at most.
 #define MARCH_STEPS 1024
-// Steps that narrow a bracket, at most.
-#define REFINE_STEPS 24
-// Halvings that find where a surface begins.
-#define EDGE_STEPS 10
+// Samples of g that find and narrow one change of its sign, at most.
+#define CROSS_STEPS 48
+// How often the two take turns, at most.
+#define WALL_TRIES 16
+// Pixels after its start on a wall within which a ray still counts as on its own side.
+#define START_PIXELS 2.0
+// Times that a ray goes straight on from splash to body or back, at most.
+#define MOST_HAND_OVERS 4
 
-// A hit is a root of f with |f| no larger than this, in particle radii,
+// A wall is a surface where |g| is no larger than this, in particle radii,
 #define ACCEPTED 0.05
-// or than this part of what a pixel covers in the middle of the liquid, whichever is more.
+// or than this part of what a pixel covers there, whichever is more.
 #define ACCEPTED_PIXELS 0.1
 // Depths of a footprint that differ by more are a jump, and not interpolated: in particle radii, or what a STEEP surface
-// changes from pixel to pixel in the middle of the liquid, whichever is more.
+// changes from pixel to pixel there, whichever is more.
 #define JUMP 2.0
 // Tangent of the angle against the view plane (81 degrees) of the steepest surface that counts as continuous.
 #define STEEP 6.0
-// A root is found where |f| is no larger than this, in particle radii,
+// A root is found where |g| is no larger than this, in particle radii.
 #define CONVERGED 0.001
-// or than this fraction of the farthest depth, where float32 has no finer steps.
-#define CONVERGED_DEPTH 0.000001
 
 // A ray meets the host's scene between two pixels where it lies no further behind the second one's depth than this fraction of
 // it: a floor seen at 5 degrees falls off so much from row to row in a picture of 768 rows.

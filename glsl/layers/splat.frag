@@ -1,5 +1,7 @@
-// The nearest front or farthest back of a class of particles: exact ray cast of each ellipsoid (Sigg06).
+// The nearest front or farthest back of a class of particles: exact ray cast of each ellipsoid (Sigg06). BALL: a front also says
+// where the ray leaves the particle again.
 #version 460
+// Compiled with any of: BALL
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "frame.glsl"
@@ -11,6 +13,9 @@ layout(location = 1) flat in vec3 g_diagonal;
 layout(location = 2) flat in vec3 g_mixed;
 layout(location = 0) out float out_depth; // linear depth; negative where the near plane lies inside this particle
 layout(location = 1) out uint out_normal; // outward, eye space
+#ifdef BALL
+layout(location = 2) out float out_far; // depth at which the ray leaves the same particle
+#endif
 
 void main() {
     vec3 v = view_ray(gl_FragCoord.xy);
@@ -25,6 +30,11 @@ void main() {
     float depth = center.z + s;
     out_normal = encode_normal(normalize(times_shape(g_diagonal, g_mixed, q + s * v)));
     out_depth = depth;
+#ifdef BALL
+    out_far = far_depth;
+    // From within, the wall that is met is the far one.
+    if (depth < near) out_normal = encode_normal(normalize(times_shape(g_diagonal, g_mixed, q + (root - b) / a * v)));
+#endif
     if (depth < near) {
         // The ray starts inside this particle: nothing can be in front of that.
         depth = near;

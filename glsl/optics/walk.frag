@@ -21,11 +21,11 @@ layout(constant_id = 3) const bool HAS_SPLASH = true;
 layout(constant_id = 4) const bool HAS_BODY = true;
 layout(constant_id = 5) const bool ENCODE_SRGB = false;
 layout(constant_id = 6) const bool HOST_BACKGROUND = false; // only liquid is drawn, over what is there
-layout(set = 0, binding = 1) uniform texture2DArray body_depth;
-layout(set = 0, binding = 2) uniform utexture2DArray body_normal;
-layout(set = 0, binding = 3) uniform texture2DArray splash_depth;
-layout(set = 0, binding = 4) uniform utexture2DArray splash_normal;
-layout(set = 0, binding = 5) uniform texture2DArray front_tiles; // smallest, largest front depth
+layout(set = 0, binding = 1) uniform texture2D walls;            // pixels above, tiles below (walls.comp)
+layout(set = 0, binding = 2) uniform texture2DArray body_depth;
+layout(set = 0, binding = 3) uniform utexture2DArray body_normal;
+layout(set = 0, binding = 4) uniform texture2DArray splash_depth;
+layout(set = 0, binding = 5) uniform utexture2DArray splash_normal;
 layout(location = 0) out vec4 out_color;
 #ifdef DEBUG
 layout(location = 1) out vec4 out_walk;      // pattern, outcome, hits, length inside
@@ -33,8 +33,11 @@ layout(location = 2) out vec4 out_direction; // world space; w: surfaces whose n
 #endif
 #include "environment.glsl"
 #include "scene.glsl"
-#include "search.glsl"
+#include "line.glsl"
+#include "walls.glsl"
 #include "background.glsl"
+
+const int AIR = -1; // beside the classes: what a ray is in
 
 // How far a pixel's view ray has come.
 struct Walk {
@@ -45,11 +48,13 @@ struct Walk {
     float hits;
     float length_inside;
     float flipped; // surfaces whose normal faced the wrong way
-    int cls;       // of the volume it is in, or enters
+    int within;    // class of the volume it is in, or AIR
+    Ball ball;     // where that is a splash
     int second;    // class of the second volume, or -1
     int outcome;
-    int doubt; // why a walk that met every surface may have missed one, or OUTCOME_HIT
+    uint volumes;  // entered
     uint bounces;
+    bool side;     // whether it met a side wall
     ivec2 scene_pixel; // where it ended on the scene
 };
 
@@ -61,24 +66,18 @@ void write_pixel(vec3 color, int pattern, int outcome, Walk w) {
 #endif
 }
 
-void note_doubt(inout Walk w, int why) { w.doubt = w.doubt == OUTCOME_HIT ? why : w.doubt; }
-
-// Turns a normal to where it has to face.
-void face(inout Walk w, inout vec3 n, bool wrong) {
-    if (wrong) {
-        n = -n;
-        w.flipped += 1.0;
-    }
+float front_depth(int cls, ivec2 pixel) {
+    if (cls == CLASS_SPLASH) return HAS_SPLASH ? texelFetch(splash_depth, ivec3(pixel, SIDE_FRONT), 0).x : 0.0;
+    return HAS_BODY ? texelFetch(body_depth, ivec3(pixel, SIDE_FRONT), 0).x : 0.0;
 }
 
 // Depth of the first surface at a pixel, the nearer of both fronts, and its class; not above 0 where there is no liquid.
 // Where liquid surrounds the eye, the ray starts `inside`, at the near plane.
 float first_surface(ivec2 pixel, out int cls, out bool inside) {
-    float splash = HAS_SPLASH ? map_depth(CLASS_SPLASH, SIDE_FRONT, pixel) : 0.0;
-    float body = HAS_BODY ? map_depth(CLASS_BODY, SIDE_FRONT, pixel) : 0.0;
+    float splash = front_depth(CLASS_SPLASH, pixel), body = front_depth(CLASS_BODY, pixel);
     // Negative: the near plane lies inside that class. The eye is inside the body where the host says so.
     bool body_around = false;
-    if (HAS_BODY) body_around = frame.eye_inside * (REFRACTIONS == 1 ? 1.0 : map_depth(CLASS_BODY, SIDE_BACK, pixel)) > 0.0;
+    if (HAS_BODY) body_around = frame.eye_inside * (REFRACTIONS == 1 ? 1.0 : walls_at(pixel).y) > 0.0;
     inside = body_around || body < 0.0 || splash < 0.0;
     cls = body_around || body < 0.0 ? CLASS_BODY : CLASS_SPLASH;
     float depth = frame.near;
@@ -89,100 +88,95 @@ float first_surface(ivec2 pixel, out int cls, out bool inside) {
     return depth;
 }
 
-// Eq. (6): what is reflected at a front surface is gathered, what is refracted goes on.
-void enter(inout Walk w, vec3 n) {
-    face(w, n, dot(w.dir, n) > 0.0);
-    float air = -dot(w.dir, n);
-    vec3 bent = refract(w.dir, n, 1.0 / frame.ior);
-    float reflected = fresnel(air, -dot(bent, n), frame.ior, EXACT_FRESNEL);
-    w.color += w.light * reflected * background(w.x, reflect(w.dir, n));
-    w.light *= 1.0 - reflected;
-    w.dir = bent;
+// Eqs. (6) to (8) at a wall with the outward normal n: what the outside sends back is gathered, and the ray is bent, or beyond the
+// critical angle reflected inside.
+void meet(inout Walk w, Wall wall) {
+    vec3 n = wall.normal, dir = w.dir;
+    bool entering = w.within == AIR;
     w.hits += 1.0;
-}
-
-// Follows the ray inside up to a wall, whose normal is n, or to where it ends otherwise; eq. (9) for this interval.
-void run_inside(inout Walk w, int came_from, out int side, out vec3 n) {
-    float t;
-    int found = find_exit(trace(w.x, w.dir), w.cls, came_from, t, side);
-    t = max(t, 0.0); // the last step onto a wall at hand may round to before it
-    if (found == OUTCOME_PAST_JUMP || found == OUTCOME_OPPOSITE_WALL) {
-        note_doubt(w, found);
-        found = OUTCOME_HIT;
+    if ((dot(w.dir, n) > 0.0) == entering) {
+        n = -n;
+        w.flipped += 1.0;
     }
-    w.outcome = found;
-    bool whole = true;
-    n = w.dir;
-    if (w.outcome == OUTCOME_HIT) n = sample_normal(w.cls, side, project(w.x + t * w.dir), whole);
-#ifdef SCENE
-    // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
-    float t_scene, gap = w.outcome == OUTCOME_HIT ? WETTING_GAP / max(abs(dot(w.dir, n)), WETTING_FLAT) : 0.0;
-    if (meets_scene(in_view(w.x, w.dir, t + gap), t_scene, w.scene_pixel)) {
-        t = t_scene;
-        w.outcome = OUTCOME_SCENE;
-    }
-#endif
-    w.x += t * w.dir;
-    w.length_inside += t;
-    w.light *= exp(-frame.absorption * t);
-    if (w.outcome == OUTCOME_HIT && !whole) note_doubt(w, OUTCOME_PAST_JUMP);
-}
-
-// Eqs. (7) and (8): refracts out through a wall, or reflects all light beyond the critical angle. Returns whether the ray
-// is outside now.
-bool leave(inout Walk w, vec3 n) {
-    w.hits += 1.0;
-    face(w, n, dot(w.dir, n) < 0.0);
-    vec3 bent = refract(w.dir, -n, frame.ior), mirrored = reflect(w.dir, -n);
-    bool outside = dot(bent, bent) > 0.0;
-    if (outside) {
-        float reflected = fresnel(dot(bent, n), dot(w.dir, n), frame.ior, EXACT_FRESNEL);
+    vec3 against = entering ? n : -n;
+    vec3 bent = refract(w.dir, against, entering ? 1.0 / frame.ior : frame.ior), mirrored = reflect(w.dir, against);
+    if (dot(bent, bent) > 0.0) {
+        float before = -dot(w.dir, against), after = -dot(bent, against);
+        float reflected = fresnel(entering ? before : after, entering ? after : before, frame.ior, EXACT_FRESNEL);
         w.color += w.light * reflected * background(w.x, mirrored);
         w.light *= 1.0 - reflected;
         w.dir = bent;
+        w.within = entering ? wall.cls : AIR;
+        if (entering) {
+            ++w.volumes;
+            if (w.volumes == 2u) w.second = wall.cls;
+        }
     } else {
         w.dir = mirrored;
         if (w.bounces == INTERNAL_REFLECTIONS) w.outcome = OUTCOME_REFLECTION_LIMIT;
         ++w.bounces;
     }
-    return outside;
+    w.x += (w.within == AIR ? wall.beside.y : wall.beside.x) * dir;
 }
 
-// Through a volume, from wall to wall, until the ray leaves it or ends.
-void cross_volume(inout Walk w) {
-    int came_from = -1;
-    bool outside = false;
-    while (!outside && w.outcome == OUTCOME_HIT) {
-        int side;
-        vec3 n;
-        run_inside(w, came_from, side, n);
-        if (w.outcome != OUTCOME_HIT) break;
-        outside = leave(w, n);
-        came_from = side;
+// Whether liquid of the other class goes on behind a wall from within: then there is none. Takes the ray there.
+bool handed_over(inout Walk w, int cls) {
+    ivec2 pixel = nearest(project(w.x));
+    float d = -w.x.z;
+    if (cls == CLASS_SPLASH) {
+        if (!HAS_BODY || body_at(project(w.x), d).g >= 0.0) return false;
+        w.within = CLASS_BODY;
+        return true;
     }
+    if (!HAS_SPLASH) return false;
+    vec2 depths = walls_at(pixel).zw;
+    if (d < depths.x || d > depths.y) return false;
+    Ball ball = ball_at(pixel, depths);
+    vec3 q = w.x - ball.center;
+    if (dot(q, q) >= ball.radius * ball.radius) return false;
+    w.within = CLASS_SPLASH;
+    w.ball = ball;
+    return true;
 }
 
-// To the front of a second volume. False where the ray meets none.
-bool reach_second(inout Walk w) {
-    float t;
-    int found;
-    bool jumped;
-    int next = find_entry(trace(w.x, w.dir), t, found, jumped);
+// Goes on to the next wall, or to where the walk ends; eq. (9) on the way inside. True where there is nothing to meet: from
+// splash to body, or back.
+bool go_on(inout Walk w, out Wall wall) {
+    bool inside = w.within != AIR;
+    int found = OUTCOME_HIT;
+    if (w.within == CLASS_SPLASH) {
+        vec2 t;
+        meets_ball(w.ball, w.x, w.dir, t);
+        t.y = max(t.y, 0.0);
+        wall = Wall(t.y, (w.x + t.y * w.dir - w.ball.center) / w.ball.radius, CLASS_SPLASH, false, vec2(0.0), w.ball);
+    } else {
+        Ray ray = trace(w.x, w.dir);
+        int outcome;
+        if (!find_wall(ray, inside, wall, outcome)) {
+            found = outcome;
+            if (!inside && outcome == OUTCOME_HIT) found = OUTCOME_NO_LIQUID;
+        }
+    }
+    float t = max(wall.t, 0.0); // the last step onto a wall at hand may round to before it
 #ifdef SCENE
-    float t_scene;
-    if (next >= 0 && meets_scene(in_view(w.x, w.dir, t), t_scene, w.scene_pixel)) {
-        w.outcome = OUTCOME_SCENE;
-        return false;
+    // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
+    float t_scene, gap = inside && found == OUTCOME_HIT ? WETTING_GAP / max(abs(dot(w.dir, wall.normal)), WETTING_FLAT) : 0.0;
+    if ((inside || found == OUTCOME_HIT) && meets_scene(in_view(w.x, w.dir, t + gap), t_scene, w.scene_pixel)) {
+        t = t_scene;
+        found = OUTCOME_SCENE;
     }
 #endif
-    if (jumped) note_doubt(w, OUTCOME_PAST_JUMP);
-    if (next < 0) {
-        w.outcome = found;
-        return false;
+    if (inside) {
+        w.length_inside += t;
+        w.light *= exp(-frame.absorption * t);
     }
-    w.x += t * w.dir;
-    w.cls = w.second = next;
-    return true;
+    if (inside || found == OUTCOME_HIT) w.x += t * w.dir;
+    w.outcome = found;
+    if (found != OUTCOME_HIT) return false;
+    if (inside && handed_over(w, wall.cls)) return true;
+    w.side = w.side || wall.side;
+    w.ball = wall.ball;
+    return false;
 }
 
 void main() {
@@ -191,29 +185,47 @@ void main() {
     int first;
     bool inside;
     float depth = first_surface(pixel, first, inside);
-    Walk w = Walk(depth * v, dir, vec3(0.0), vec3(1.0), 0.0, 0.0, 0.0, first, -1, OUTCOME_HIT, OUTCOME_HIT, 0u, pixel);
+    Walk w = Walk(depth * v, dir, vec3(0.0), vec3(1.0), 0.0, 0.0, 0.0, AIR, Ball(vec3(0.0), 1.0), -1, OUTCOME_HIT, 0u, 0u, false, pixel);
     if (depth <= 0.0 || scene_hides(pixel, depth)) {
         if (HOST_BACKGROUND) discard;
         write_pixel(behind(pixel, dir), PATTERN_NONE, OUTCOME_NO_LIQUID, w);
         return;
     }
 
-    const uint volumes = REFRACTIONS == 1 ? 1u : REFRACTIONS / 2u;
-    for (uint volume = 0u; volume < volumes && w.outcome == OUTCOME_HIT; ++volume) {
-        if (volume > 0u || !inside) {
-            bool whole;
-            enter(w, volume == 0u ? map_normal(w.cls, SIDE_FRONT, pixel) : sample_normal(w.cls, SIDE_FRONT, project(w.x), whole));
-        }
-        if (REFRACTIONS == 1) break;
-        cross_volume(w);
-        if (w.outcome != OUTCOME_HIT || volume + 1u == volumes) break;
-        if (!reach_second(w)) break;
+    Wall wall = Wall(0.0, vec3(0.0), first, false, vec2(0.0), w.ball);
+    if (first == CLASS_SPLASH) {
+        wall.normal = decode_normal(texelFetch(splash_normal, ivec3(pixel, SIDE_FRONT), 0).x);
+        vec2 depths = vec2(depth, texelFetch(splash_depth, ivec3(pixel, SIDE_BACK), 0).x);
+        if (!inside) wall.ball = ball_at(pixel, depths);
+        else wall.ball = Ball(depths.y * v - wall.normal, 1.0);
+        w.ball = wall.ball;
+    } else {
+        wall.normal = body_normal_of(SIDE_FRONT, pixel);
     }
+    if (inside) {
+        w.within = first;
+        w.volumes = 1u;
+    }
+    const uint volumes = REFRACTIONS == 1 ? 1u : REFRACTIONS / 2u, most = REFRACTIONS + INTERNAL_REFLECTIONS + uint(MOST_HAND_OVERS);
+    // Where nothing is to be met: inside at the start, or from one class to the other.
+    bool straight = inside, done = false;
+    for (uint i = 0u; i < most && !done; ++i) {
+        if (!straight) meet(w, wall);
+        done = REFRACTIONS == 1 || w.outcome != OUTCOME_HIT || (w.within == AIR && w.volumes == volumes);
+        if (!done) {
+            straight = go_on(w, wall);
+            done = w.outcome != OUTCOME_HIT;
+        }
+    }
+    int outcome = w.outcome;
+    if (!done) outcome = OUTCOME_NOT_CONVERGED;
+    if (outcome == OUTCOME_NO_LIQUID) outcome = OUTCOME_HIT; // no second volume
+    if (outcome == OUTCOME_HIT && w.side) outcome = OUTCOME_SIDE_WALL;
 #ifdef SCENE
     if (w.outcome == OUTCOME_SCENE) w.color += w.light * scene_light(w.scene_pixel);
     else
 #endif
     w.color += w.light * background(w.x, w.dir);
     int pattern = w.second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + w.second;
-    write_pixel(w.color, pattern, w.outcome == OUTCOME_HIT ? w.doubt : w.outcome, w);
+    write_pixel(w.color, pattern, outcome, w);
 }

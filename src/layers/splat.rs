@@ -73,8 +73,19 @@ pub(super) fn surface(
         // The depth test works on near / d: nearest is largest. Nothing there: 0 for fronts, 1 for backs.
         let (compare, clear) = if side == SIDE_FRONT { (CompareOp::GREATER, 0.0) } else { (CompareOp::LESS, 1.0) };
         let rendering = Rendering::into(depth, side).and(normal, side).testing(test, clear, compare);
-        let draws = classes.iter().flat_map(|class| particles(scene, drawn, &shader::SPLAT_FRAG, *class, side, None));
+        let draws = classes.iter().flat_map(|class| particles(scene, drawn, &shader::SPLAT_FRAG[0], *class, side, None));
         plan.render(names.passes[side as usize], rendering, draws.collect());
     }
     Surface { depth, normal, sides }
+}
+
+/// Draws the nearest splashes: where each pixel's ray enters one, and, in layer 1 of the depths, where it leaves the same.
+pub(super) fn balls(plan: &mut Plan, scene: &Scene, drawn: &Drawn, names: &Names) -> Surface {
+    let depth = plan.map(names.depth, Format::R32_SFLOAT, 2);
+    let normal = plan.map(names.normal, Format::R32_UINT, 1);
+    let test = depth_test(plan);
+    let rendering = Rendering::into(depth, 0).and(normal, 0).and(depth, 1).testing(test, 0.0, CompareOp::GREATER);
+    let draws = particles(scene, drawn, &shader::SPLAT_FRAG[1], CLASS_SPLASH, SIDE_FRONT, None);
+    plan.render(names.passes[0], rendering, draws);
+    Surface { depth, normal, sides: 2 }
 }

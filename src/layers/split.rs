@@ -33,9 +33,11 @@ impl Layering for Split {
 
     fn record(&self, plan: &mut Plan, scene: &Scene, drawn: &Drawn) -> Layered {
         let sides = scene.sides();
-        let mut surface = |class, names| splat::surface(plan, scene, drawn, &[class], sides, names);
-        let splash = scene.splash.then(|| surface(CLASS_SPLASH, &SPLASH));
-        let body = scene.body.then(|| surface(CLASS_BODY, &BODY));
+        let splash = scene.splash.then(|| match sides {
+            1 => splat::surface(plan, scene, drawn, &[CLASS_SPLASH], 1, &SPLASH),
+            _ => splat::balls(plan, scene, drawn, &SPLASH),
+        });
+        let body = scene.body.then(|| splat::surface(plan, scene, drawn, &[CLASS_BODY], sides, &BODY));
         Layered { splash, body: body.map(Body::from), thickness: None, speed: None }
     }
 }

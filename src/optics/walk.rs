@@ -1,6 +1,6 @@
 //! The walk of each view ray through the liquid, and its colour (`glsl/optics/walk.frag`; Imai16 §4.4, §4.5).
 
-use super::{Fresnel, tiles};
+use super::{Fresnel, walls};
 use crate::{
     frame::Scene,
     input::{Background, EnvironmentShape},
@@ -56,19 +56,21 @@ impl Walk {
         // class's, or without any particles what no shader has written.
         let any = surfaces.body.or(surfaces.splash).unwrap_or_else(|| placeholder(plan));
         let (body, splash) = (surfaces.body.unwrap_or(any), surfaces.splash.unwrap_or(any));
-        // Where rays outside the liquid need not look for a second volume.
-        let second = self.refractions == 4 && scene.count > 0;
-        let tiles = if second { tiles::record(plan, surfaces, &body, &splash) } else { body.depth };
+        // One refraction looks at fronts alone.
+        let walls = match self.refractions > 1 && scene.count > 0 {
+            true => walls::record(plan, surfaces, &body, &splash),
+            false => walls::placeholder(plan),
+        };
 
         let has_scene = scene.has_scene;
         let cube = scene.environment == EnvironmentShape::Cube;
         let variant = usize::from(scene.walks) + 2 * usize::from(has_scene) + 4 * usize::from(cube);
         let mut call = Call::draw(&VIEW_VERT, &WALK_FRAG[variant])
+            .read("walls", walls)
             .read("body_depth", body.depth)
             .read("body_normal", body.normal)
             .read("splash_depth", splash.depth)
             .read("splash_normal", splash.normal)
-            .read("front_tiles", tiles)
             .read("environment", plan.given(External::Environment))
             .constant("REFRACTIONS", self.refractions)
             .constant("INTERNAL_REFLECTIONS", self.internal_reflections)

@@ -1,0 +1,280 @@
+// Walls of the liquid along a ray (docs/methods.md, "Walls along a ray").
+
+const float HOLE = 1e30; // g where the body has no interval
+
+// How much the depth of a steep surface changes from pixel to pixel at a depth.
+float pixel_depth(float d) { return d / max(abs(frame.pixel_scale.x), abs(frame.pixel_scale.y)); }
+float jump_at(float d) { return max(JUMP, STEEP * pixel_depth(d)); }
+float accepted_at(float d) { return max(ACCEPTED, ACCEPTED_PIXELS * pixel_depth(d)); }
+
+vec4 walls_at(ivec2 pixel) { return texelFetch(walls, pixel, 0); }
+
+// The four pixels around a position, and the weights of the upper corner.
+struct Footprint {
+    ivec2 lo;
+    ivec2 hi;
+    vec2 weight;
+};
+
+Footprint footprint(vec2 position) {
+    vec2 q = position - 0.5, corner = floor(q);
+    ivec2 last = ivec2(frame.size) - 1;
+    return Footprint(clamp(ivec2(corner), ivec2(0), last), clamp(ivec2(corner) + 1, ivec2(0), last), q - corner);
+}
+
+// From the lowest corner, so that the interpolation rounds at the spread's size and not at the depth's.
+float bilinear(vec4 d, vec2 weight, float low) {
+    d -= low;
+    return low + mix(mix(d.x, d.y, weight.x), mix(d.z, d.w, weight.x), weight.y);
+}
+
+// The body at a position, as a ray at depth d meets it.
+struct Body {
+    float g;      // negative inside
+    float spread; // of the depths that were interpolated; 0 where they were not
+    int side;     // whose term of g is the larger
+    bvec2 whole;  // front, back: whether they were interpolated
+};
+
+Body body_at(vec2 position, float d) {
+    Footprint p = footprint(position);
+    vec2 a = walls_at(p.lo).xy, b = walls_at(ivec2(p.hi.x, p.lo.y)).xy, c = walls_at(ivec2(p.lo.x, p.hi.y)).xy,
+         e = walls_at(p.hi).xy;
+    vec2 low = min(min(a, b), min(c, e)), high = max(max(a, b), max(c, e));
+    ivec2 own_pixel = nearest(position);
+    // The pixel that holds the position is one of the four.
+    bool right = own_pixel.x != p.lo.x, lower = own_pixel.y != p.lo.y;
+    vec2 own = lower ? (right ? e : c) : (right ? b : a);
+    bool all_there = low.y > 0.0;
+    float jump = jump_at(d);
+    bvec2 whole = bvec2(all_there && high.x - low.x <= jump, all_there && high.y - low.y <= jump);
+    float front = whole.x ? bilinear(vec4(a.x, b.x, c.x, e.x), p.weight, low.x) : own.x;
+    float back = whole.y ? bilinear(vec4(a.y, b.y, c.y, e.y), p.weight, low.y) : own.y;
+    float before = front - d, behind = d - back;
+    float spread = max(whole.x ? high.x - low.x : 0.0, whole.y ? high.y - low.y : 0.0);
+    return Body(own.y > 0.0 ? max(before, behind) : HOLE, spread, before > behind ? SIDE_FRONT : SIDE_BACK, whole);
+}
+
+vec3 body_normal_of(int side, ivec2 pixel) { return decode_normal(texelFetch(body_normal, ivec3(pixel, side), 0).x); }
+
+// With the weights of the depth there.
+vec3 body_normal_at(int side, bool whole, vec2 position) {
+    if (!whole) return body_normal_of(side, nearest(position));
+    Footprint p = footprint(position);
+    vec3 upper = mix(body_normal_of(side, p.lo), body_normal_of(side, ivec2(p.hi.x, p.lo.y)), p.weight.x);
+    vec3 lower = mix(body_normal_of(side, ivec2(p.lo.x, p.hi.y)), body_normal_of(side, p.hi), p.weight.x);
+    return normalize(mix(upper, lower, p.weight.y));
+}
+
+// Where on the screen the body ends around a pixel at a depth: away from the neighbours inside, towards those outside.
+vec2 outward(ivec2 pixel, float d, vec2 along) {
+    vec2 sum = vec2(0.0);
+    for (int k = 0; k < 9; ++k) {
+        ivec2 step = ivec2(k % 3, k / 3) - 1;
+        vec2 body = walls_at(clamp(pixel + step, ivec2(0), ivec2(frame.size) - 1)).xy;
+        if (d < body.x || d > body.y) sum += vec2(step) / max(dot(vec2(step), vec2(step)), 1.0);
+    }
+    return dot(sum, sum) > 0.25 ? sum : along;
+}
+
+// Of a side wall at x: `inner` is the pixel that holds the ray where it is inside, `outer` the body just across the wall, `across` the
+// way on the screen that the ray takes outwards.
+vec3 side_normal(ivec2 inner, Body outer, vec3 x, vec2 across) {
+    // The plane through the eye along the edge on the screen.
+    vec2 c = frame.pixel_scale * outward(inner, -x.z, across);
+    vec3 edge = normalize(vec3(c, dot(c, x.xy) / -x.z));
+    vec3 front = body_normal_of(SIDE_FRONT, inner), back = body_normal_of(SIDE_BACK, inner), sight = normalize(x);
+    vec3 limb = outer.g < HOLE ? (outer.side == SIDE_FRONT ? front : back) : 0.5 * (front + back);
+    limb -= dot(limb, sight) * sight;
+    float weight = dot(limb, edge) > 0.0 ? min(dot(limb, limb), 1.0) : 0.0;
+    return normalize(mix(edge, limb, weight));
+}
+
+struct Ball {
+    vec3 center; // eye space
+    float radius;
+};
+
+// The splash in front at a pixel, from the depths at which the pixel's ray enters and leaves it and the normal at the first.
+Ball ball_at(ivec2 pixel, vec2 depths) {
+    vec3 v = view_ray(vec2(pixel) + 0.5), n = decode_normal(texelFetch(splash_normal, ivec3(pixel, SIDE_FRONT), 0).x);
+    float radius = (depths.y - depths.x) * dot(v, v) / max(-2.0 * dot(n, v), 1e-6);
+    return Ball(depths.x * v - radius * n, radius);
+}
+
+// Where a ray enters and leaves a ball; false where it passes by.
+bool meets_ball(Ball ball, vec3 x, vec3 dir, out vec2 t) {
+    vec3 q = x - ball.center;
+    float middle = -dot(q, dir);
+    vec3 across = q + middle * dir;
+    float square = ball.radius * ball.radius - dot(across, across);
+    float half_chord = sqrt(max(square, 0.0));
+    t = middle + vec2(-half_chord, half_chord);
+    return square > 0.0;
+}
+
+// Goes on along a line from s through tiles and pixels in which a ray stays on its side, inside the body or outside of all liquid,
+// by their own depths. Gives the s at which it comes into a pixel where it may not, and that pixel; s = 1 at the end.
+float skip(ScreenLine line, bool inside, float nudge, inout float s, out ivec2 pixel, out float end, out bvec2 meets) {
+    int level = WALL_TILE_BITS;
+    int steps = 0;
+    bool stopped = false;
+    meets = bvec2(false);
+    end = s;
+    pixel = ivec2(0);
+    while (!stopped && s < 1.0 && steps < MARCH_STEPS) {
+        ++steps;
+        pixel = pixel_after(line, s, nudge);
+        ivec2 at = pixel >> level;
+        vec4 wall = walls_at(at + ivec2(0, level > 0 ? int(frame.size.y) : 0));
+        end = leaves_square(line, at << level, 1 << level, s + nudge);
+        float d0 = depth_at(line, s), d1 = depth_at(line, end), shallow = min(d0, d1), deep = max(d0, d1);
+        bool stays = shallow > wall.x && deep < wall.y;
+        bool before_body = level > 0 || deep < wall.x || shallow > wall.y, before_splash = deep < wall.z || shallow > wall.w;
+        if (inside ? stays : before_body && before_splash) {
+            ivec2 next = pixel_after(line, end, nudge);
+            if (any(notEqual(next >> WALL_TILE_BITS, pixel >> WALL_TILE_BITS))) level = WALL_TILE_BITS;
+            s = end;
+        } else if (level > 0) {
+            level = 0;
+        } else {
+            stopped = true;
+            meets = inside ? bvec2(true, false) : bvec2(!before_body, !before_splash);
+        }
+    }
+    return steps < MARCH_STEPS ? s : 2.0;
+}
+
+// A wall that a ray meets.
+struct Wall {
+    float t;
+    vec3 normal; // outward
+    int cls;
+    bool side;   // a side wall
+    vec2 beside; // of a side wall: from t to where the ray is certainly inside, and to where it is certainly outside
+    Ball ball;   // of a splash
+};
+
+// Samples g pixel by pixel from s on, until it changes its sign; then narrows the bracket. True with a wall; else s is where the
+// ray is clear of the body again, or 1.
+bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alarmed, out Wall wall) {
+    float sign_of_side = inside ? 1.0 : -1.0, pixel = 1.0 / max(ray.span, 1e-6), start = START_PIXELS * pixel;
+    // f = g inside, -g outside: negative on the ray's own side.
+    float a = 0.0, fa = -1e-6, b = 0.0, fb = 0.0, at = max(s, 0.5 * pixel), back = pixel, kept = 0.0;
+    bool known = s <= start, bracketed = false, done = false, found = false;
+    vec2 along = line.end - line.start;
+    at = min(at, 1.0);
+    for (int i = 0; i < CROSS_STEPS && !done; ++i) {
+        float d = depth_at(line, at);
+        Body body = body_at(line.start + at * along, d);
+        float f = sign_of_side * body.g;
+        if (at < start && f <= accepted_at(d)) f = min(f, -1e-6);
+        if (bracketed) {
+            if (f < 0.0) {
+                a = at;
+                fa = f;
+                if (kept < 0.0) fb *= 0.5;
+                kept = -1.0;
+            } else {
+                b = at;
+                fb = f;
+                if (kept > 0.0) fa *= 0.5;
+                kept = 1.0;
+            }
+        } else if (f < 0.0) {
+            if (known && at >= alarmed && -f > body.spread && -f < HOLE || at >= 1.0 || (f <= -HOLE && at >= alarmed)) done = true;
+            a = at;
+            fa = f;
+            known = true;
+        } else {
+            b = at;
+            fb = f;
+            bracketed = known;
+        }
+        if (bracketed) {
+            found = true;
+            bool level = abs(fa) >= HOLE || abs(fb) >= HOLE || (i & 1) == 1;
+            at = level ? 0.5 * (a + b) : b - fb * (b - a) / (fb - fa);
+            done = done || abs(f) <= CONVERGED || b - a <= 1e-3 * pixel;
+        } else if (known) {
+            s = at;
+            at = min(at + pixel, 1.0);
+        } else {
+            // The map's own pixels noticed late: back to where the ray was on its side.
+            at = max(at - back, 0.0);
+            back *= 2.0;
+            if (at <= start) {
+                known = true;
+                a = 0.0;
+                fa = -1e-6;
+                bracketed = true;
+                at = 0.5 * b;
+            }
+        }
+    }
+    if (!found) return false;
+    float accepted = accepted_at(depth_at(line, at));
+    vec2 pa = line.start + a * along, pb = line.start + b * along;
+    Body before = body_at(pa, depth_at(line, a)), after = body_at(pb, depth_at(line, b));
+    Body outer = after, inner = before;
+    vec2 p_inner = pa;
+    if (!inside) {
+        outer = before;
+        inner = after;
+        p_inner = pb;
+    }
+    bool at_inner = abs(inner.g) <= accepted;
+    bool surface = at_inner || abs(outer.g) <= accepted;
+    float hit = clamp(at, a, b);
+    wall.t = t_at(ray, hit);
+    wall.cls = CLASS_BODY;
+    wall.side = !surface;
+    wall.ball = Ball(vec3(0.0), 0.0);
+    wall.beside = vec2(0.0);
+    vec2 p = line.start + hit * along;
+    if (surface) {
+        int which = outer.g < HOLE ? outer.side : inner.side;
+        bvec2 whole = at_inner ? inner.whole : outer.whole;
+        wall.normal = body_normal_at(which, which == SIDE_FRONT ? whole.x : whole.y, p);
+    } else {
+        wall.normal = side_normal(nearest(p_inner), outer, ray.origin + wall.t * ray.dir, inside ? along : -along);
+        // Off the border between two pixels, so that a ray goes on from the one on its side.
+        vec2 ends = vec2(t_at(ray, max(a - SIDE_NUDGE * pixel, 0.0)), t_at(ray, min(b + SIDE_NUDGE * pixel, 1.0))) - wall.t;
+        wall.beside = inside ? ends : ends.yx;
+    }
+    return true;
+}
+
+// The first wall that a ray inside the body, or outside of all liquid, meets. Without one the outcome says why.
+bool find_wall(Ray ray, bool inside, out Wall wall, out int outcome) {
+    ScreenLine line = screen_line(ray);
+    float nudge = PIXEL_NUDGE / max(ray.span, 1e-6), s = 0.0;
+    bool found = false;
+    outcome = OUTCOME_NOT_CONVERGED;
+    wall = Wall(0.0, vec3(0.0), CLASS_BODY, false, vec2(0.0), Ball(vec3(0.0), 0.0));
+    for (int i = 0; i < WALL_TRIES && !found && s < 1.0; ++i) {
+        ivec2 pixel;
+        float end;
+        bvec2 meets;
+        s = skip(line, inside, nudge, s, pixel, end, meets);
+        if (s >= 1.0) break;
+        float t_ball = HOLE;
+        Ball ball = Ball(vec3(0.0), 0.0);
+        if (HAS_SPLASH && meets.y) {
+            ball = ball_at(pixel, walls_at(pixel).zw);
+            vec2 t;
+            if (meets_ball(ball, ray.origin, ray.dir, t) && t.x > 1e-4) t_ball = t.x;
+        }
+        if (HAS_BODY && meets.x) found = cross_body(ray, line, inside, s, end, wall);
+        else s = end;
+        if (t_ball < HOLE && (!found || t_ball < wall.t)) {
+            found = true;
+            wall = Wall(t_ball, normalize(ray.origin + t_ball * ray.dir - ball.center), CLASS_SPLASH, false, vec2(0.0), ball);
+        }
+    }
+    if (!found) {
+        wall.t = ray.reach;
+        if (s >= 1.0 && s < 2.0) outcome = ray.leaves_view ? OUTCOME_LEFT_VIEW : (inside ? OUTCOME_NO_WALL : OUTCOME_HIT);
+    }
+    return found;
+}
