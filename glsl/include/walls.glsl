@@ -113,36 +113,48 @@ bool meets_ball(Ball ball, vec3 x, vec3 dir, out vec2 t) {
     return square > 0.0;
 }
 
+// A pixel in which a ray may meet a wall.
+struct Stop {
+    ivec2 pixel;
+    float s;      // where the ray comes into it; at least 1 where there is none
+    float end;    // where it leaves it
+    bvec2 meets;  // the body, a splash
+};
+
 // Goes on along a line from s through tiles and pixels in which a ray stays on its side, inside the body or outside of all liquid,
-// by their own depths. Gives the s at which it comes into a pixel where it may not, and that pixel; s = 1 at the end.
-float skip(ScreenLine line, bool inside, float nudge, inout float s, out ivec2 pixel, out float end, out bvec2 meets) {
-    int level = WALL_TILE_BITS;
-    int steps = 0;
+// by their own depths.
+Stop skip(ScreenLine line, bool inside, float nudge, float s) {
+    vec2 along = line.end - line.start;
+    bvec2 moves = greaterThan(abs(along), vec2(1e-6));
+    vec2 per_pixel = 1.0 / mix(vec2(1.0), along, moves), ahead = vec2(greaterThan(along, vec2(0.0)));
+    int level = WALL_TILE_BITS, below = int(frame.size.y);
+    Stop stop = Stop(pixel_after(line, s, nudge), s, s, bvec2(false));
+    float d = depth_at(line, s);
     bool stopped = false;
-    meets = bvec2(false);
-    end = s;
-    pixel = ivec2(0);
-    while (!stopped && s < 1.0 && steps < MARCH_STEPS) {
-        ++steps;
-        pixel = pixel_after(line, s, nudge);
-        ivec2 at = pixel >> level;
-        vec4 wall = walls_at(at + ivec2(0, level > 0 ? int(frame.size.y) : 0));
-        end = leaves_square(line, at << level, 1 << level, s + nudge);
-        float d0 = depth_at(line, s), d1 = depth_at(line, end), shallow = min(d0, d1), deep = max(d0, d1);
-        bool stays = shallow > wall.x && deep < wall.y;
-        bool before_body = level > 0 || deep < wall.x || shallow > wall.y, before_splash = deep < wall.z || shallow > wall.w;
-        if (inside ? stays : before_body && before_splash) {
+    for (int i = 0; i < MARCH_STEPS && !stopped && stop.s < 1.0; ++i) {
+        ivec2 at = stop.pixel >> level;
+        vec4 wall = walls_at(ivec2(at.x, level > 0 ? at.y + below : at.y));
+        vec2 border = (vec2(at << level) + float(1 << level) * ahead - line.start) * per_pixel;
+        float end = min(moves.x ? border.x : 1.0, moves.y ? border.y : 1.0);
+        end = clamp(end, min(stop.s + nudge, 1.0), 1.0);
+        float d_end = depth_at(line, end), shallow = min(d, d_end), deep = max(d, d_end);
+        bool beside_body = level > 0 || deep < wall.x || shallow > wall.y, beside_splash = deep < wall.z || shallow > wall.w;
+        bool free = inside ? shallow > wall.x && deep < wall.y : beside_body && beside_splash;
+        stop.end = end;
+        stop.meets = bvec2(inside || !beside_body, !inside && !beside_splash);
+        stopped = !free && level == 0;
+        if (free) {
             ivec2 next = pixel_after(line, end, nudge);
-            if (any(notEqual(next >> WALL_TILE_BITS, pixel >> WALL_TILE_BITS))) level = WALL_TILE_BITS;
-            s = end;
-        } else if (level > 0) {
-            level = 0;
+            bool same_tile = next >> WALL_TILE_BITS == stop.pixel >> WALL_TILE_BITS;
+            level = same_tile ? level : WALL_TILE_BITS;
+            stop.pixel = next;
+            stop.s = end;
+            d = d_end;
         } else {
-            stopped = true;
-            meets = inside ? bvec2(true, false) : bvec2(!before_body, !before_splash);
+            level = 0;
         }
     }
-    return steps < MARCH_STEPS ? s : 2.0;
+    return stop;
 }
 
 // A wall that a ray meets.
@@ -160,10 +172,10 @@ struct Wall {
 bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alarmed, out Wall wall) {
     float sign_of_side = inside ? 1.0 : -1.0, pixel = 1.0 / max(ray.span, 1e-6), start = START_PIXELS * pixel;
     // f = g inside, -g outside: negative on the ray's own side.
-    float a = 0.0, fa = -1e-6, b = 0.0, fb = 0.0, at = max(s, 0.5 * pixel), back = pixel, kept = 0.0;
+    float a = 0.0, fa = -1e-6, b = 0.0, fb = 0.0, at = min(max(s, 0.5 * pixel), 1.0), back = pixel, kept = 0.0;
+    Body before = Body(0.0, 0.0, SIDE_FRONT, bvec2(true)), after = before; // at a and b
     bool known = s <= start, bracketed = false, done = false, found = false;
     vec2 along = line.end - line.start;
-    at = min(at, 1.0);
     for (int i = 0; i < CROSS_STEPS && !done; ++i) {
         float d = depth_at(line, at);
         Body body = body_at(line.start + at * along, d);
@@ -173,11 +185,13 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
             if (f < 0.0) {
                 a = at;
                 fa = f;
+                before = body;
                 if (kept < 0.0) fb *= 0.5;
                 kept = -1.0;
             } else {
                 b = at;
                 fb = f;
+                after = body;
                 if (kept > 0.0) fa *= 0.5;
                 kept = 1.0;
             }
@@ -185,10 +199,12 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
             if (known && at >= alarmed && -f > body.spread && -f < HOLE || at >= 1.0 || (f <= -HOLE && at >= alarmed)) done = true;
             a = at;
             fa = f;
+            before = body;
             known = true;
         } else {
             b = at;
             fb = f;
+            after = body;
             bracketed = known;
         }
         if (bracketed) {
@@ -215,7 +231,6 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
     if (!found) return false;
     float accepted = accepted_at(depth_at(line, at));
     vec2 pa = line.start + a * along, pb = line.start + b * along;
-    Body before = body_at(pa, depth_at(line, a)), after = body_at(pb, depth_at(line, b));
     Body outer = after, inner = before;
     vec2 p_inner = pa;
     if (!inside) {
@@ -253,20 +268,17 @@ bool find_wall(Ray ray, bool inside, out Wall wall, out int outcome) {
     outcome = OUTCOME_NOT_CONVERGED;
     wall = Wall(0.0, vec3(0.0), CLASS_BODY, false, vec2(0.0), Ball(vec3(0.0), 0.0));
     for (int i = 0; i < WALL_TRIES && !found && s < 1.0; ++i) {
-        ivec2 pixel;
-        float end;
-        bvec2 meets;
-        s = skip(line, inside, nudge, s, pixel, end, meets);
-        if (s >= 1.0) break;
+        Stop stop = skip(line, inside, nudge, s);
+        s = stop.s;
         float t_ball = HOLE;
         Ball ball = Ball(vec3(0.0), 0.0);
-        if (HAS_SPLASH && meets.y) {
-            ball = ball_at(pixel, walls_at(pixel).zw);
+        if (HAS_SPLASH && stop.meets.y && s < 1.0) {
+            ball = ball_at(stop.pixel, walls_at(stop.pixel).zw);
             vec2 t;
             if (meets_ball(ball, ray.origin, ray.dir, t) && t.x > 1e-4) t_ball = t.x;
         }
-        if (HAS_BODY && meets.x) found = cross_body(ray, line, inside, s, end, wall);
-        else s = end;
+        if (HAS_BODY && stop.meets.x && s < 1.0) found = cross_body(ray, line, inside, s, stop.end, wall);
+        else s = stop.end;
         if (t_ball < HOLE && (!found || t_ball < wall.t)) {
             found = true;
             wall = Wall(t_ball, normalize(ray.origin + t_ball * ray.dir - ball.center), CLASS_SPLASH, false, vec2(0.0), ball);
@@ -274,7 +286,7 @@ bool find_wall(Ray ray, bool inside, out Wall wall, out int outcome) {
     }
     if (!found) {
         wall.t = ray.reach;
-        if (s >= 1.0 && s < 2.0) outcome = ray.leaves_view ? OUTCOME_LEFT_VIEW : (inside ? OUTCOME_NO_WALL : OUTCOME_HIT);
+        if (s >= 1.0) outcome = ray.leaves_view ? OUTCOME_LEFT_VIEW : (inside ? OUTCOME_NO_WALL : OUTCOME_HIT);
     }
     return found;
 }
