@@ -28,23 +28,24 @@
 // How a pixel's walk ended.
 // No particle covers the pixel.
 #define OUTCOME_NO_LIQUID 0
-// Every surface was found where a ray would meet it.
+// Every wall was a surface or a ball's.
 #define OUTCOME_HIT 1
-// The ray crossed the border of the view inside the liquid, or looking for a second volume.
-#define OUTCOME_LEFT_VIEW 2
-// The map ahead ended, or jumped, where the ray would leave the liquid.
-#define OUTCOME_HOLE 3
-// MARCH_STEPS did not reach the end of the ray.
-#define OUTCOME_NOT_CONVERGED 4
+// The walk is complete, but one of its walls was a side wall: a map ended or jumped there.
+#define OUTCOME_SIDE_WALL 2
+// The ray left the view or came before the near plane: inside the liquid, or outside of it before it left the liquid's box.
+#define OUTCOME_LEFT_VIEW 3
+// The ray left the liquid's box and was still inside the liquid.
+#define OUTCOME_NO_WALL 4
+// The search ran out of steps.
+#define OUTCOME_NOT_CONVERGED 5
 // One more internal reflection than a walk may have.
-#define OUTCOME_REFLECTION_LIMIT 5
-// Every surface was found, but the map jumped before one of the hits, or within its footprint: a wall that no map holds may
-// stand before it.
-#define OUTCOME_PAST_JUMP 6
-// Every surface was found, one of them on the map of the side that the ray runs away from.
-#define OUTCOME_OPPOSITE_WALL 7
+#define OUTCOME_REFLECTION_LIMIT 6
 // The ray ended on the host's scene.
-#define OUTCOME_SCENE 8
+#define OUTCOME_SCENE 7
+// Those of the searches before walls.glsl; they go with search.glsl.
+#define OUTCOME_HOLE 101
+#define OUTCOME_PAST_JUMP 102
+#define OUTCOME_OPPOSITE_WALL 103
 
 // Which particles a class draws on which side; bits of the cull pass's verdict.
 #define VISIBLE_FRONT 1
@@ -131,12 +132,14 @@
 // Halvings that find where a surface begins.
 #define EDGE_STEPS 10
 
-// A hit is a root of f with |f| no larger than this, in particle radii,
+// A wall is a surface where |g| on either side of it is no larger than this, in particle radii,
 #define ACCEPTED 0.05
-// or than this part of what a pixel covers in the middle of the liquid, whichever is more.
+// or than this part of what a pixel covers at the ray's depth there, whichever is more.
 #define ACCEPTED_PIXELS 0.1
+// Pixels after its start on a wall within which a ray still counts as on its own side.
+#define START_PIXELS 2.0
 // Depths of a footprint that differ by more are a jump, and not interpolated: in particle radii, or what a STEEP surface
-// changes from pixel to pixel in the middle of the liquid, whichever is more.
+// changes from pixel to pixel at the ray's depth there, whichever is more.
 #define JUMP 2.0
 // Tangent of the angle against the view plane (81 degrees) of the steepest surface that counts as continuous.
 #define STEEP 6.0

@@ -15,11 +15,10 @@ pub const PATTERNS: &[(u32, &str)] = &[
 pub const OUTCOMES: &[(u32, &str)] = &[
     (s::OUTCOME_NO_LIQUID, "no liquid"),
     (s::OUTCOME_HIT, "hit"),
+    (s::OUTCOME_SIDE_WALL, "side wall: walked to its end, but a map ended or jumped at one of the walls"),
     (s::OUTCOME_LEFT_VIEW, "left the view"),
-    (s::OUTCOME_HOLE, "hole or depth jump"),
+    (s::OUTCOME_NO_WALL, "left the liquid's box inside the liquid"),
     (s::OUTCOME_NOT_CONVERGED, "not converged"),
     (s::OUTCOME_REFLECTION_LIMIT, "limit of internal reflections"),
-    (s::OUTCOME_PAST_JUMP, "past a jump: all surfaces found, but a map jumped on the way to one or beside it"),
-    (s::OUTCOME_OPPOSITE_WALL, "opposite wall: all surfaces found, one of them through the map behind the ray"),
     (s::OUTCOME_SCENE, "met the host's scene"),
 ];
