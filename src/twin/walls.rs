@@ -266,7 +266,7 @@ impl Maps<'_> {
                 return Ok(wall);
             }
         }
-        Err(end)
+        watch.passed(self, t).ok_or(end)
     }
 
     /// The first wall of either class that a ray outside meets.
@@ -287,7 +287,8 @@ impl Maps<'_> {
                 });
             }
             if t >= limit(ball) {
-                return ball.map(|(ball, t)| Entry::Ball(ball, t)).ok_or(end);
+                let body = || watch.passed(self, t).map(Entry::Body);
+                return ball.map(|(ball, t)| Entry::Ball(ball, t)).or_else(body).ok_or(end);
             }
             (last, t) = (t, self.next(ray, t).min(end.t));
         }
@@ -420,13 +421,24 @@ impl Watch<'_> {
             }
             return None;
         }
-        // The wall is where g passes through zero; where the ray never was on its own side, it is where that is no more overlooked.
-        let (own, other) = match self.own {
-            Some(own) => bisect(own, t, |t| self.beyond(maps, t) >= 0.0),
-            None => bisect(self.last, t, |t| !self.stays(maps, t)),
-        };
+        Some(self.passed(maps, t).unwrap_or_else(|| {
+            // It never was on its own side: the wall is where that is no longer overlooked.
+            let (own, other) = bisect(self.last, t, |t| !self.stays(maps, t));
+            self.between(maps, own, other)
+        }))
+    }
+
+    /// The wall, if the ray is on the other side at t and was on its own before: where g passes through zero, however late it
+    /// is noticed so near the start.
+    fn passed(&self, maps: &Maps, t: f64) -> Option<Wall> {
+        let own = self.own.filter(|_| self.beyond(maps, t) >= 0.0)?;
+        let (own, other) = bisect(own, t, |t| self.beyond(maps, t) >= 0.0);
+        Some(self.between(maps, own, other))
+    }
+
+    fn between(&self, maps: &Maps, own: f64, other: f64) -> Wall {
         let (inside, outside) = if self.inside { (own, other) } else { (other, own) };
-        Some(maps.wall(self.ray, inside, outside))
+        maps.wall(self.ray, inside, outside)
     }
 }
 

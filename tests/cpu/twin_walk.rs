@@ -251,19 +251,21 @@ fn a_ball_of_the_body_is_left_through_its_limb() {
     let frame = frame(&settings, (Vec3::splat(-2.0), Vec3::splat(2.0)));
     let layers = sphere_maps(&frame, center, radius);
     let maps = Maps { frame: &frame, maps: [NOTHING, as_maps(&layers)], scene: None };
-    let mut worst: f64 = 0.0;
+    let mut side_walls = 0;
     for k in 0..360 {
         // The limb is where the sphere is seen edge on, a little nearer than its centre.
         let (across, nearer) = (f64::from(k).to_radians(), radius / 1.2);
         let dir = (DVec3::new(across.cos(), across.sin(), 0.0) * (1.0 - nearer * nearer).sqrt()).with_z(nearer);
         let ray = Ray::new(&frame, center / RADIUS, dir);
         let wall = maps.leave_body(&ray).expect("a wall");
-        assert!(wall.side_wall, "{k}");
         // A pixel is 0.02 radii.
         assert!((wall.inside * RADIUS - radius).abs() < 0.01, "{k}: {}", wall.inside * RADIUS);
-        worst = worst.max(degrees(wall.normal, dir));
+        // Where the ball is thinner than twice what is accepted, its limb is its front or its back.
+        let off = degrees(wall.normal, dir);
+        assert!(off < if wall.side_wall { 2.0 } else { 3.5 }, "{k}: {off}");
+        side_walls += usize::from(wall.side_wall);
     }
-    assert!(worst < 2.0, "{worst}");
+    assert!(side_walls > 250, "{side_walls}");
 }
 
 /// One ball hides the other's middle. Rays that go straight on never see the other; those bent outwards do, and enter it through
@@ -301,8 +303,8 @@ fn two_droplets_behind_each_other_are_not_fused() {
 #[test]
 fn a_second_ball_is_met_at_its_rim() {
     let (settings, rays) = optics("four", 0);
-    let frame = frame(&settings, (Vec3::new(-0.6, -0.4, -1.9), Vec3::new(0.6, 0.4, -0.9)));
-    let (near, far) = ((DVec3::new(-0.15, 0.0, -1.2), 0.15), (DVec3::new(0.12, 0.0, -1.35), 0.12));
+    let frame = frame(&settings, (Vec3::new(-0.6, -0.4, -1.9), Vec3::new(0.6, 0.4, -0.5)));
+    let (near, far) = ((DVec3::new(-0.12, 0.0, -0.7), 0.15), (DVec3::new(0.25, 0.0, -1.15), 0.22));
     let splash = splash_maps(&frame, &[near, far]);
     let maps = Maps { frame: &frame, maps: [as_maps(&splash), NOTHING], scene: None };
     let (mut met, mut sideways) = (0, 0);
@@ -376,28 +378,31 @@ fn fronts_and_backs_that_cross_do_no_harm() {
     assert!(plain == crossed);
 }
 
-/// A body of one pixel has walls all around it.
+/// A body of one pixel has walls all around it. Where its normals say nothing about them, rays pass unbent.
 #[test]
 fn a_lone_pixel_of_body_is_walked_through() {
     let (settings, rays) = optics("four", 4);
     let frame = frame(&settings, (Vec3::splat(-20.0), Vec3::splat(20.0)));
     let pixel = [SIZE[0] as usize / 2, SIZE[1] as usize / 2];
     let index = pixel[1] * SIZE[0] as usize + pixel[0];
-    for (tilt, outcome) in [(0.0, OUTCOME_HIT), (0.8, OUTCOME_SIDE_WALL)] {
+    for tilt in [0.0, 0.8] {
         let n = DVec3::new(f64::sin(tilt), 0.0, f64::cos(tilt));
-        let layers = [(40.0, n), (42.0, DVec3::NEG_Z)].map(|(depth, n)| {
+        let layers = [(40.0, n), (42.0, -n)].map(|(depth, n)| {
             let mut layer = (vec![0.0; (SIZE[0] * SIZE[1]) as usize], vec![0; (SIZE[0] * SIZE[1]) as usize]);
             (layer.0[index], layer.1[index]) = (depth, encode_normal(n.as_vec3()));
             layer
         });
         let maps = Maps { frame: &frame, maps: [NOTHING, as_maps(&layers)], scene: None };
         let found = walk(&maps, &rays, &grey(), pixel);
+        let bent = snell(view_ray(&frame, index).normalize(), n, 1.0 / IOR).unwrap();
+        let (outcome, direction, least, most) = match tilt {
+            0.0 => (OUTCOME_HIT, DVec3::NEG_Z, 1.999, 2.001),
+            _ => (OUTCOME_SIDE_WALL, bent, 0.1, 1.0),
+        };
         assert_eq!((found.pattern, found.outcome, found.hits), (PATTERN_BODY, outcome, 2), "{found:?}");
         assert!((found.color - 0.5).abs().max_element() < 1e-5, "{found:?}");
-        assert!(found.length > 0.0 && found.length < 2.01, "{found:?}");
-        if tilt == 0.0 {
-            assert!((found.length - 2.0).abs() < 1e-3 && degrees(found.direction, DVec3::NEG_Z) < 0.5, "{found:?}");
-        }
+        assert!((least..most).contains(&found.length), "{found:?}");
+        assert!(degrees(found.direction, direction) < 0.5, "{found:?}");
     }
 }
 
