@@ -15,7 +15,7 @@ use meniscus::{
         background::env_color,
         normal::encode_normal,
         walk::{Walk, walk},
-        walls::{Map, Maps, Ray},
+        walls::{Entry, Map, Maps, Ray},
     },
 };
 
@@ -299,32 +299,32 @@ fn two_droplets_behind_each_other_are_not_fused() {
     assert!(counts.into_iter().all(|n| n > 100), "{counts:?}");
 }
 
-/// Bent out of the first ball, rays come to a second beside it, through the side that it turns away from the eye, too.
+/// Sideways and from behind, through the rim or where a map of fronts has nothing.
 #[test]
-fn a_second_ball_is_met_at_its_rim() {
-    let (settings, rays) = optics("four", 0);
-    let frame = frame(&settings, (Vec3::new(-0.6, -0.4, -1.9), Vec3::new(0.6, 0.4, -0.5)));
-    let (near, far) = ((DVec3::new(-0.12, 0.0, -0.7), 0.15), (DVec3::new(0.25, 0.0, -1.15), 0.22));
-    let splash = splash_maps(&frame, &[near, far]);
+fn a_ball_is_met_from_every_side() {
+    let (settings, _) = optics("four", 0);
+    let (center, radius) = (DVec3::new(0.05, -0.03, -1.2), 0.15);
+    let frame = frame(&settings, (Vec3::splat(-2.0), Vec3::splat(2.0)));
+    let splash = splash_maps(&frame, &[(center, radius)]);
     let maps = Maps { frame: &frame, maps: [as_maps(&splash), NOTHING], scene: None };
-    let (mut met, mut sideways) = (0, 0);
-    for (i, found) in walk_all(&maps, &rays, &grey()).iter().enumerate() {
-        let dir = view_ray(&frame, i).normalize();
-        let Some((x, out, first)) = through(DVec3::ZERO, dir, near.0, near.1) else { continue };
-        let Some((t, _)) = crossings(x, out, far.0, far.1).filter(|(t, _)| *t > 0.0) else { continue };
-        let y = x + t * out;
-        let n = (y - far.0) / far.1;
-        if out.dot(n) > -0.3 || near.0.cross(dir).length() > 0.99 * near.1 {
-            continue; // grazes one of them: small errors are large ones afterwards
+    let turn = |angle: f64| DVec3::new(angle.cos(), angle.sin(), 0.0);
+    let (mut met, mut behind) = (0, 0);
+    for k in 0..60 {
+        for polar in (5..180).step_by(10).map(|degrees| f64::from(degrees).to_radians()) {
+            // From all around, past the centre by different distances.
+            let from = turn(0.1 + 0.1 * f64::from(k)) * polar.sin() + DVec3::Z * polar.cos();
+            let past = 0.97 * radius * f64::from(k % 10) / 10.0 * from.any_orthonormal_vector();
+            let ray = Ray::new(&frame, (center + past + 0.3 * from) / RADIUS, -from);
+            let (t, _) = crossings(ray.origin * RADIUS, ray.dir, center, radius).unwrap();
+            let n = (ray.origin * RADIUS + t * ray.dir - center) / radius;
+            let Ok(Entry::Ball(ball, at)) = maps.enter(&ray) else { panic!("{k} {polar}: not met") };
+            assert!((at * RADIUS - t).abs() < 1e-3 * radius, "{k} {polar}: {} {t}", at * RADIUS);
+            assert!(degrees(ball.normal(ray.at(at)), n) < 0.1, "{k} {polar}");
+            met += 1;
+            behind += usize::from(n.dot((center + radius * n).normalize()) > 0.0);
         }
-        let (_, exit, second) = through(x, out, far.0, far.1).unwrap();
-        assert_eq!((found.pattern, found.outcome, found.hits), (PATTERN_SPLASH_SPLASH, OUTCOME_HIT, 4), "{i}");
-        assert!(degrees(found.direction, exit) < 0.2, "{i}: {}", degrees(found.direction, exit));
-        assert!((found.length / (first + second) - 1.0).abs() < 2e-3, "{i}");
-        met += 1;
-        sideways += usize::from(n.dot(y.normalize()) > 0.0);
     }
-    assert!(met > 300 && sideways > 50, "{met} met, {sideways} of them from behind");
+    assert!(behind > 300 && met - behind > 300, "{behind} of {met} from behind");
 }
 
 /// A droplet half in the body, before it or behind: what is between them bends nothing.
