@@ -102,4 +102,3 @@ impl std::hash::Hash for Shader {
         std::ptr::from_ref(self).hash(state);
     }
 }
-pub const CONVERGED_DEPTH: f32 = 1e-6; pub const OUTCOME_HOLE: u32 = 100; pub const OUTCOME_OPPOSITE_WALL: u32 = 101; pub const FRONT_TILE: u32 = 16; // TEMP

@@ -173,7 +173,7 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
     float sign_of_side = inside ? 1.0 : -1.0, pixel = 1.0 / max(ray.span, 1e-6), start = START_PIXELS * pixel;
     // f = g inside, -g outside: negative on the ray's own side.
     float a = 0.0, fa = -1e-6, b = 0.0, fb = 0.0, at = min(max(s, 0.5 * pixel), 1.0), back = pixel, kept = 0.0;
-    Body before = Body(0.0, 0.0, SIDE_FRONT, bvec2(true)), after = before; // at a and b
+    Body before = Body(HOLE, 0.0, SIDE_FRONT, bvec2(false)), after = before; // at a and b
     bool known = s <= start, bracketed = false, done = false, found = false;
     vec2 along = line.end - line.start;
     for (int i = 0; i < CROSS_STEPS && !done; ++i) {

@@ -95,7 +95,8 @@ void meet(inout Walk w, Wall wall) {
     bool entering = w.within == AIR;
     w.hits += 1.0;
     if ((dot(w.dir, n) > 0.0) == entering) {
-        n = -n;
+        // A ray that comes through a side wall the wrong way is not bent.
+        n = wall.side ? (entering ? -dir : dir) : -n;
         w.flipped += 1.0;
     }
     vec3 against = entering ? n : -n;

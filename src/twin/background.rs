@@ -1,6 +1,6 @@
 //! Twin of `glsl/include/background.glsl`: b(direction) of eq. 6, the environment at infinity or the host's opaque scene.
 
-use super::search::{Maps, Ray};
+use super::walls::{Maps, Ray, bisect};
 use crate::{
     Equirect,
     shader::{SCENE_BEHIND, STEEP},
@@ -83,15 +83,6 @@ impl Maps<'_> {
         }
         env_color(environment, Mat3::from_mat4(self.frame.eye_to_env).as_dmat3() * dir)
     }
-}
-
-/// Narrows the bracket from a to b in which something becomes true.
-fn bisect(mut a: f64, mut b: f64, yet: impl Fn(f64) -> bool) -> (f64, f64) {
-    for _ in 0..60 {
-        let t = 0.5 * (a + b);
-        if yet(t) { b = t } else { a = t }
-    }
-    (a, b)
 }
 
 /// Light from a direction of the environment map's own space (+y up), bilinear; columns wrap around, rows end at the

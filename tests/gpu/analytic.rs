@@ -9,8 +9,8 @@ use glam::{DMat3, DVec3, Mat3, Vec3};
 use meniscus::{
     Camera, Ellipsoid, Particles, Settings,
     shader::{
-        OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_OPPOSITE_WALL, OUTCOME_PAST_JUMP, OUTCOME_REFLECTION_LIMIT,
-        PATTERN_BODY, PATTERN_SPLASH, PATTERN_SPLASH_BODY,
+        OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_REFLECTION_LIMIT, OUTCOME_SIDE_WALL, PATTERN_BODY, PATTERN_SPLASH,
+        PATTERN_SPLASH_BODY,
     },
     twin::normal::decode_normal,
 };
@@ -158,7 +158,7 @@ pub fn within(what: &str, driver: &Driver, mut errors: Vec<f64>, at_least: usize
 }
 
 fn found_all(outcome: u32) -> bool {
-    [OUTCOME_HIT, OUTCOME_PAST_JUMP, OUTCOME_OPPOSITE_WALL].contains(&outcome)
+    [OUTCOME_HIT, OUTCOME_SIDE_WALL].contains(&outcome)
 }
 
 /// Silhouette, exit direction (two refractions) and path length of a ball, in the middle of the view and off its axis.

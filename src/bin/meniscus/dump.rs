@@ -6,7 +6,7 @@ use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     host::Session,
     inspect::{self, Spec, Walk},
-    shader::{FRONT_TILE, SIDE_BACK, SIDE_FRONT},
+    shader::{ACCEPTED, ACCEPTED_PIXELS, FRONT_TILE, JUMP, SIDE_BACK, SIDE_FRONT, STEEP},
     space::Space,
     twin::normal::decode_normal,
 };
@@ -199,7 +199,8 @@ pub fn frame(job: &Job) -> Value {
     let bounds = job.scene.particles.bounds().unwrap_or_default();
     // In radii, whatever the origin.
     let block = inspect::uniforms(&job.camera, s, job.size, &Space::new(radius, Vec3::ZERO), bounds);
-    let tolerance = meniscus::twin::search::Tolerance::of(&block);
+    // What a pixel covers at depth 1.
+    let pixel = block.pixel_scale.abs().max_element().recip();
     let walk = Walk::of(&s.method.optics);
     let mut frame = json!({
         "width": job.size[0],
@@ -217,10 +218,13 @@ pub fn frame(job: &Job) -> Value {
         "asked": job.picture.record(),
         "refractions": walk.map(|w| w.refractions),
         "sampling": {
-            "jump": radius * tolerance.jump,
-            "accepted": radius * tolerance.accepted,
-            "meaning": "maps are sampled bilinearly, normals with them, where all four pixels have a surface whose depths \
-                        spread by at most `jump`, else at the nearest pixel; a hit has |f| of at most `accepted`",
+            "jump": radius * JUMP,
+            "jump_by_depth": pixel * STEEP,
+            "accepted": radius * ACCEPTED,
+            "accepted_by_depth": pixel * ACCEPTED_PIXELS,
+            "meaning": "the body's maps are sampled bilinearly, normals with them, where all four pixels have a front and a back \
+                        and the depths spread by at most `jump`, else at the pixel itself; a wall is a surface where the ray's \
+                        depth is the map's within `accepted`; either is that, or its `_by_depth` times the ray's depth, if more",
         },
         "pattern_codes": codes(codes::PATTERNS),
         "outcome_codes": codes(codes::OUTCOMES),
