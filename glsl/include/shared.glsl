@@ -128,8 +128,6 @@
 #define ACCEPTED 0.05
 // or than this part of what a pixel covers there, whichever is more.
 #define ACCEPTED_PIXELS 0.1
-// Pixels after its start on a wall within which a ray still counts as on its own side.
-#define START_PIXELS 2.0
 // Depths of a footprint that differ by more are a jump, and not interpolated: in particle radii, or what a STEEP surface
 // changes from pixel to pixel there, whichever is more.
 #define JUMP 2.0

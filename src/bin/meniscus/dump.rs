@@ -6,7 +6,7 @@ use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     host::Session,
     inspect::{self, Spec, Walk},
-    shader::{ACCEPTED, ACCEPTED_PIXELS, FRONT_TILE, JUMP, SIDE_BACK, SIDE_FRONT, STEEP},
+    shader::{ACCEPTED, ACCEPTED_PIXELS, WALL_TILE, JUMP, SIDE_BACK, SIDE_FRONT, STEEP},
     space::Space,
     twin::normal::decode_normal,
 };
@@ -234,7 +234,7 @@ pub fn frame(job: &Job) -> Value {
         "smoothing": "`_raw`: before; `_last_step`: what the last step read; missing_silhouette: how much the row pass of the \
                       last iteration missed",
         "nearest_and_farthest": "before they are parted: the nearest front, negative (-inf: none), and the farthest back",
-        "front_tiles": format!("range of all front depths in each tile of {FRONT_TILE} x {FRONT_TILE} pixels; in an empty one \
+        "front_tiles": format!("range of all front depths in each tile of {WALL_TILE} x {WALL_TILE} pixels; in an empty one \
                                the nearest is beyond the farthest"),
         "normals": "eye space, outward: fronts towards the viewer, backs away from it",
         "particle_classes": {"0": "splash", "1": "body"},

@@ -2,7 +2,7 @@
 
 use crate::support::{Case, Choose, camera, each_driver, random_cloud};
 use glam::Vec3;
-use meniscus::{Settings, shader::FRONT_TILE, twin::tiles::tiles};
+use meniscus::{Settings, shader::WALL_TILE, twin::tiles::tiles};
 
 #[test]
 fn ranges_equal_the_twin() {
@@ -24,7 +24,7 @@ fn ranges_equal_the_twin() {
             let expected = tiles(size, &maps);
             let (low, high) =
                 (shot.floats("front depth tiles", 0).unwrap(), shot.floats("front depth tiles", 1).unwrap());
-            assert_eq!(low.len() as u32, size[0].div_ceil(FRONT_TILE) * size[1].div_ceil(FRONT_TILE));
+            assert_eq!(low.len() as u32, size[0].div_ceil(WALL_TILE) * size[1].div_ceil(WALL_TILE));
             let found: Vec<_> = low.into_iter().zip(high).collect();
             assert_eq!(found, expected, "{}: {size:?}", driver.name);
         });
