@@ -211,13 +211,15 @@ impl Renderer {
             }
         }
         for search in [Search::Runs, Search::Relation] {
-            for keep in [None, Some(1.0)] {
-                let options = prepare::Options { search, ..Default::default() };
-                let positions =
-                    DevicePositions::packed(vk::Buffer::null(), 1, 1.0).options(options).keep_class_below(keep);
-                let mut scene = scene([0, 0]);
-                self.fill(&mut scene, Amount::OnDevice(&positions))?;
-                scenes.push(scene);
+            for ellipsoids in [prepare::Fit::InPlace, prepare::Fit::YuTurk] {
+                for keep in [None, Some(1.0)] {
+                    let options = prepare::Options { search, ellipsoids, ..Default::default() };
+                    let positions =
+                        DevicePositions::packed(vk::Buffer::null(), 1, 1.0).options(options).keep_class_below(keep);
+                    let mut scene = scene([0, 0]);
+                    self.fill(&mut scene, Amount::OnDevice(&positions))?;
+                    scenes.push(scene);
+                }
             }
         }
         let plans: Vec<_> = scenes.iter().map(frame::plan).collect::<Result<_, _>>()?;
@@ -261,7 +263,8 @@ impl Renderer {
                 (scene.splash, scene.body) = (p.count > 0, p.count > 0);
                 let constants = p.constants(p.offset % BINDING_ALIGNMENT)?;
                 let keep_classes = p.keep_class_below.is_some();
-                let made = Preparation { constants, entries: p.entries(), keep_classes, neighbours: 0 };
+                let yu_turk = p.options.ellipsoids == prepare::Fit::YuTurk;
+                let made = Preparation { constants, entries: p.entries(), yu_turk, keep_classes, neighbours: 0 };
                 scene.prepare = (p.count > 0).then_some(made);
             }
         }

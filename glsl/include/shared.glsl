@@ -101,6 +101,21 @@
 // a shape.
 #define DEGENERATE_VARIANCE 0.05
 
+// Ellipsoids in place (docs/methods.md): semi-axis, in particle radii, where neighbours spread as in a filled body.
+#define ELLIPSOID_SIZE 1.45
+// Between what multiples of it semi-axes follow the spread.
+#define ELLIPSOID_THIN 0.9
+#define ELLIPSOID_WIDE 1.2
+// Of the way to its neighbours' mean a centre goes so much,
+#define ELLIPSOID_SMOOTHING 0.1
+// and so much of what that mean lies further to one side than under a flat surface: the particle protrudes.
+#define ELLIPSOID_PULL 0.5
+// Radius of a splash, in particle radii.
+#define SPLASH_RADIUS 1.0
+// A body particle takes on its shape over so much density above the splash threshold, as parts of a filled body's; at the
+// threshold it is the splash's ball.
+#define SPLASH_FADE 0.15
+
 // Plane fitting: the least |n.v|, both of unit length, for which eq. (5) of Imai16 is trusted.
 #define FIT_GRAZING_LIMIT 0.01
 // The longest update of a depth that is taken, in sigma.
@@ -206,7 +221,7 @@ struct Prepare {
     float cell_edge;
     float radius;              // particle radius r
     float support;             // h, of the number density's kernel
-    float reach;               // of the neighbours that shape ellipsoids, 2 h
+    float reach;               // of the neighbours that shape ellipsoids: h, or YuTurk13's 2 h
     float splash_below;        // a splash has less than this fraction of a filled body's density
     float keep_below;          // below this fraction the last frame's class is kept
     float filled_density;      // sum of a filled body's weights
@@ -215,7 +230,8 @@ struct Prepare {
     float least_ratio;         // 1 / largest ratio of semi-axes
     float longest_axis;        // longest semi-axis, in r
     float filled_variance;     // of a filled body's neighbours, in r squared
-    uint min_neighbours;       // with fewer a particle stays a sphere
+    float flat_offset;         // how far below a flat surface's particle the mean of its neighbours lies, in r
+    uint min_neighbours;       // with no more YuTurk13's particle stays a sphere
     uint sort_pass;
     uint has_last_classes;     // 1 if the last frame left classes
     uint cells_around;         // cells to either side of a particle's own that hold neighbours
