@@ -220,37 +220,37 @@ void write_ellipsoid(uint k, vec3 center, mat3 v, vec3 lengths) {
           vec3(dot(r0 * r1, l), dot(r0 * r2, l), dot(r1 * r2, l)));
 }
 
-// Variances along the columns of v, in r squared, of neighbours with these mean squares and products in world units.
-vec3 principal(vec3 d, vec3 m, out mat3 v) {
+// Variances of a particle's neighbours around their mean, in r squared, along the columns of v; from sums, those of component b.
+vec3 variances_of(Sums s, uint b, vec3 mean, out mat3 v) {
     float unit = 1.0 / prepare.radius;
+    vec3 d = of(s.diagonal, b) / s.weight[b] - mean * mean;
+    vec3 m = of(s.mixed_part, b) / s.weight[b] - mean.xxy * mean.yzz;
     mat3 a = unit * unit * mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z);
     eigen(a, v);
     return vec3(a[0][0], a[1][1], a[2][2]);
 }
 
-// The ellipsoid in place of particle k from its sums, those of component b; center in radii. `above`: its density above the
-// splash threshold, as a part of a filled body's.
+// The ellipsoid in place of particle k; center in radii. `above`: its density above the splash threshold, as a part of a
+// filled body's.
 void write_in_place(uint k, vec3 center, float above, Sums s, uint b) {
-    float unit = 1.0 / prepare.radius;
+    vec3 mean = of(s.first, b) / s.weight[b];
     mat3 v;
-    vec3 variance = principal(of(s.diagonal, b) / s.weight[b], of(s.mixed_part, b) / s.weight[b], v);
-    vec3 spread = sqrt(max(variance, 0.0) / prepare.filled_variance);
-    if (max(spread.x, max(spread.y, spread.z)) > ELLIPSOID_WIDE) note(CLAMPED_LONG);
-    if (min(spread.x, min(spread.y, spread.z)) < ELLIPSOID_THIN) note(CLAMPED_RATIO);
+    vec3 variance = max(variances_of(s, b, mean, v), 0.0) / prepare.filled_variance + DEGENERATE_VARIANCE;
+    vec3 wanted = ELLIPSOID_SIZE * sqrt(variance * pow(variance.x * variance.y * variance.z, -1.0 / 3.0));
+    if (max(wanted.x, max(wanted.y, wanted.z)) > ELLIPSOID_WIDE) note(CLAMPED_LONG);
+    if (min(wanted.x, min(wanted.y, wanted.z)) < ELLIPSOID_THIN) note(CLAMPED_RATIO);
     float share = clamp(above / SPLASH_FADE, 0.0, 1.0);
-    vec3 lengths = mix(vec3(SPLASH_RADIUS), ELLIPSOID_SIZE * clamp(spread, ELLIPSOID_THIN, ELLIPSOID_WIDE), share);
-    vec3 mean = unit * of(s.first, b) / s.weight[b];
+    vec3 lengths = mix(vec3(SPLASH_RADIUS), clamp(wanted, ELLIPSOID_THIN, ELLIPSOID_WIDE), share);
+    mean /= prepare.radius;
     float protrudes = 1.0 - prepare.flat_offset / max(length(mean), prepare.flat_offset);
     write_ellipsoid(k, center + share * (ELLIPSOID_SMOOTHING + ELLIPSOID_PULL * protrudes) * mean, v, lengths);
 }
 
 // YuTurk13's.
 void write_yu_turk(uint k, vec3 center, Sums s, uint b) {
-    float unit = 1.0 / prepare.radius;
-    vec3 mean = of(s.first, b) / s.weight[b], d = of(s.diagonal, b) / s.weight[b] - mean * mean;
-    vec3 m = of(s.mixed_part, b) / s.weight[b] - mean.xxy * mean.yzz;
+    vec3 mean = of(s.first, b) / s.weight[b];
     mat3 v;
-    vec3 variance = principal(d, m, v);
+    vec3 variance = variances_of(s, b, mean, v);
     float most = max(variance.x, max(variance.y, variance.z)), least = most * prepare.least_ratio;
     if (most < DEGENERATE_VARIANCE * prepare.filled_variance) {
         write_sphere(k, center, DEGENERATE);
@@ -259,7 +259,7 @@ void write_yu_turk(uint k, vec3 center, Sums s, uint b) {
     if (min(variance.x, min(variance.y, variance.z)) < least) note(CLAMPED_RATIO);
     vec3 wanted = max(variance, vec3(least)) / prepare.filled_variance;
     if (most / prepare.filled_variance > prepare.longest_axis) note(CLAMPED_LONG);
-    write_ellipsoid(k, center + prepare.smoothing * unit * mean, v, min(wanted, vec3(prepare.longest_axis)));
+    write_ellipsoid(k, center + prepare.smoothing / prepare.radius * mean, v, min(wanted, vec3(prepare.longest_axis)));
 }
 
 // Class and ellipsoid of particle k at x from its sums, those of component b.

@@ -101,15 +101,16 @@
 // a shape.
 #define DEGENERATE_VARIANCE 0.05
 
-// Ellipsoids in place (docs/methods.md): semi-axis, in particle radii, where neighbours spread as in a filled body.
-#define ELLIPSOID_SIZE 1.45
-// Between what multiples of it semi-axes follow the spread.
-#define ELLIPSOID_THIN 0.9
-#define ELLIPSOID_WIDE 1.2
+// Ellipsoids in place (docs/methods.md), in particle radii: semi-axes where neighbours spread alike along all,
+#define ELLIPSOID_SIZE 1.55
+// the shortest
+#define ELLIPSOID_THIN 1.2
+// and the longest.
+#define ELLIPSOID_WIDE 2.0
 // Of the way to its neighbours' mean a centre goes so much,
 #define ELLIPSOID_SMOOTHING 0.1
 // and so much of what that mean lies further to one side than under a flat surface: the particle protrudes.
-#define ELLIPSOID_PULL 0.5
+#define ELLIPSOID_PULL 0.7
 // Radius of a splash, in particle radii.
 #define SPLASH_RADIUS 1.0
 // A body particle takes on its shape over so much density above the splash threshold, as parts of a filled body's; at the

@@ -108,27 +108,28 @@ impl<'a> Fitter<'a> {
         Sums { mean: mean / sum, squares: squares * (1.0 / sum), density: density / self.filled }
     }
 
-    /// Semi-axes follow the spread of neighbours as seen from the particle, not from their mean: half of a body spreads as
-    /// all of it, so that a flat surface is covered by balls, and a thin sheet or a jet by what is flatter or slimmer. Their
-    /// size is such that the mean height of a surface, dents between particles included, is that of the liquid's.
+    /// Semi-axes follow how neighbours spread along one direction against the others, whatever their spacing: balls inside,
+    /// flat on a surface or in a sheet, long in a jet. Their lengths are such that the mean height of a surface, dents
+    /// between particles included, is that of the liquid's: what is drawn is these ellipsoids, not a field around them.
     ///
     /// Centres follow their neighbours a little, and more where these lie further to one side than under a flat surface: such
-    /// a particle protrudes.
+    /// a particle protrudes. One with hardly more density than a splash has hardly another shape.
     fn in_place(&self, i: usize, near: &[Neighbour]) -> (Ellipsoid, Shape) {
         let Sums { mean, squares, density } = self.sums(i, near);
-        let (variances, frame) = eigen_symmetric(squares);
-        let spread = (variances.max(DVec3::ZERO) / self.full).map(f64::sqrt);
+        let (variances, frame) = eigen_symmetric(squares - outer(mean, mean));
+        // The addend makes nothing of a spread of nothing.
+        let variances = variances.max(DVec3::ZERO) / self.full + f64::from(DEGENERATE_VARIANCE);
+        let spread = (variances / variances.element_product().cbrt()).map(f64::sqrt);
         let [size, thin, wide] = [ELLIPSOID_SIZE, ELLIPSOID_THIN, ELLIPSOID_WIDE].map(f64::from);
         let [splash, fade] = [SPLASH_RADIUS, SPLASH_FADE].map(f64::from);
         let [smoothing, pull] = [ELLIPSOID_SMOOTHING, ELLIPSOID_PULL].map(f64::from);
-        let whole = spread.clamp(DVec3::splat(thin), DVec3::splat(wide)) * size;
-        // The share of it that a particle has which hardly is no splash.
+        let wanted = spread * size;
         let share = ((density - f64::from(self.options.splash_threshold)) / fade).clamp(0.0, 1.0);
-        let lengths = (DVec3::splat(splash) * (1.0 - share) + whole * share) * self.scale.radius;
+        let lengths = DVec3::splat(splash).lerp(wanted.clamp(DVec3::splat(thin), DVec3::splat(wide)), share);
         let protrudes = (1.0 - self.flat / mean.length()).max(0.0); // 0 of a mean of 0
         let center = self.grid.positions[i].as_dvec3() + mean * (share * (smoothing + pull * protrudes));
-        let axes = (frame * DMat3::from_diagonal(lengths)).as_mat3();
-        let shape = Shape::Fitted { long: spread.x > wide, ratio: spread.z < thin };
+        let axes = (frame * DMat3::from_diagonal(lengths * self.scale.radius)).as_mat3();
+        let shape = Shape::Fitted { long: wanted.x > wide, ratio: wanted.z < thin };
         (Ellipsoid { center: center.as_vec3(), axes }, shape)
     }
 

@@ -5,7 +5,7 @@ use super::neighbours::Search;
 use crate::{
     Error, Parameters,
     parameters::{Value, choices, parameters},
-    shader::{ELLIPSOID_SIZE, ELLIPSOID_WIDE},
+    shader::ELLIPSOID_WIDE,
     space,
 };
 
@@ -51,7 +51,7 @@ impl Options {
     /// Longest semi-axis of a body particle, in particle radii.
     pub fn longest(&self) -> f32 {
         match self.ellipsoids {
-            Fit::InPlace => ELLIPSOID_SIZE * ELLIPSOID_WIDE,
+            Fit::InPlace => ELLIPSOID_WIDE,
             Fit::YuTurk => self.max_semi_axis,
         }
     }
