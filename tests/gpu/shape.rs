@@ -279,3 +279,45 @@ fn what_is_not_finite_is_left_out() {
         }
     });
 }
+
+/// Flat bodies of some layers, looked at along their normal: the front map lies where the liquid's surface is, one radius
+/// above the outermost centres, before smoothing and after, and has no gaps. With YuTurk13's fit it lies far below.
+#[test]
+fn the_surface_is_where_the_liquids_is() {
+    let (radius, distance, size) = (0.05, 3.0, [160, 120]);
+    let case = Case { camera: camera(Vec3::Z * distance, Vec3::ZERO, size), size, ..empty(radius) };
+    let slab = |layers: i32| {
+        let mut random = Random(21);
+        let flat = move |z: i32| {
+            (0..441).map(move |i| 2.0 * radius * Vec3::new((i % 21 - 10) as f32, (i / 21 - 10) as f32, z as f32))
+        };
+        let lattice = (1 - layers..=0).flat_map(flat);
+        lattice.map(|p| p + 0.25 * radius * random.point(Vec3::NEG_ONE, Vec3::ONE)).collect::<Vec<_>>()
+    };
+    each_driver(|driver| {
+        for (layers, ellipsoids) in
+            [(1, Fit::InPlace), (2, Fit::InPlace), (3, Fit::InPlace), (8, Fit::InPlace), (8, Fit::YuTurk)]
+        {
+            let positions = slab(layers);
+            let options = Options::default().ellipsoids(ellipsoids);
+            let cloud = Cloud { options, ..Cloud::new(&positions, Search::Runs) };
+            let shot = driver.shoot_cloud_unlisted(&case, &cloud);
+            for map in ["body depth (ray-cast)", "body depth (smoothed, odd)"] {
+                let depths = shot.depths(map, 0).expect("drawn");
+                // The middle of the picture: half of the slab's width.
+                let middle = |i: &usize| (i % 160).abs_diff(80) < 24 && (i / 160).abs_diff(60) < 24;
+                let seen: Vec<f32> =
+                    (0..depths.len()).filter(middle).map(|i| (distance - depths[i]) / radius - 1.0).collect();
+                let (surface, gaps): (Vec<f32>, Vec<f32>) = seen.iter().partition(|e| (-2.0..2.0).contains(*e));
+                let error = surface.iter().sum::<f32>() / surface.len() as f32;
+                let gaps = gaps.len() as f32 / seen.len() as f32;
+                let label = format!("{}: {layers} layers, {ellipsoids:?}, {map}: {error} r, {gaps} gaps", driver.name);
+                println!("{label}");
+                match ellipsoids {
+                    Fit::InPlace => assert!(error.abs() <= 0.2 && gaps <= 0.01, "{label}"),
+                    Fit::YuTurk => assert!(gaps > 0.5, "{label}"),
+                }
+            }
+        }
+    });
+}
