@@ -89,9 +89,9 @@
 #define SORT_PASSES 20
 
 // Largest run of candidates for neighbours that is looked at whole; of a longer one evenly chosen candidates stand for all.
-// A run of five cells holds 40 in liquid at rest.
+// A run of three cells holds 24 in liquid at rest, one of five 40.
 #define CROWD 1024
-// The same for a run of the relation table: 27 cells, twice as wide, hold 1728 in liquid at rest.
+// The same for a run of the relation table: 27 cells hold 216 in liquid at rest, and twice as wide 1728.
 #define CROWD_RELATION 8192
 
 // Particles that one invocation prepares together, one in each component of a vector.
