@@ -83,7 +83,7 @@ void main() {
     vec3 origin = position(prepare.count / 2u);
     if (!finite(origin)) origin = 0.5 * low + 0.5 * high;
     for (int a = 0; a < 3; ++a) extent.at[EXTENT_ORIGIN + a] = floatBitsToUint(origin[a]);
-    float unit = 1.0 / prepare.radius, room = max(prepare.longest_axis, 1.0);
+    float unit = 1.0 / prepare.radius, room = max(prepare.longest_axis, SPLASH_RADIUS);
     frame.view[3].xyz = unit * (mat3(frame.view) * origin + frame.view[3].xyz);
     // Room for ellipsoids around the outermost centres.
     frame.bounds_min = unit * (low - origin) - room;

@@ -1,11 +1,11 @@
-// From neighbours to what is drawn: number density and class (Imai16 section 4.1), and for the body the ellipsoid of
-// YuTurk13 (docs/methods.md, "Preparation").
+// From neighbours to what is drawn: number density and class (Imai16 section 4.1), and for the body an ellipsoid, in place or
+// as YuTurk13 has it (docs/methods.md, "Preparation").
 //
 // One invocation takes SHAPE_RUN particles that follow each other in the sorted order. Those of them that lie in the same cell,
 // or in the next along z, are taken together, each in a component of a vector: what is looked up and read once serves all.
 //
-// Candidates for neighbours come in runs of the sorted order. Sorted cells are as wide as the support, so 5 x 5 runs of 5
-// cells hold all candidates. With RELATION_TABLE cells are as wide as the reach, and one run of the table holds them all.
+// Candidates for neighbours come in runs of the sorted order. Sorted cells are as wide as the support, so 3 x 3 runs of 3
+// cells (with YuTurk13's reach 5 x 5 of 5) hold all candidates. With RELATION_TABLE cells are as wide as the reach, and one run of the table holds them all.
 // Either way candidates are tested exactly, so that the neighbours are the same set.
 #version 460
 // Compiled with any of: NEIGHBOURS, KEEP_CLASSES
@@ -27,6 +27,7 @@ layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_class
 layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[]; } neighbours;
 #endif
 layout(constant_id = 1) const uint COUNTERS = 0; // slot of its first counter
+layout(constant_id = 2) const bool YU_TURK = false; // which fit
 
 uint count() { return prepare.count; }
 vec3 sorted_position(uint k) { return vec3(sorted.at[3u * k], sorted.at[3u * k + 1u], sorted.at[3u * k + 2u]); }
@@ -207,17 +208,49 @@ bool classify(uint k, float relative) {
 void write_sphere(uint k, vec3 center, uint why) {
     note(why);
     // The sign says which class.
-    write(k, center, vec3(why == SPLASH ? -1.0 : 1.0, 1.0, 1.0), vec3(0.0));
+    const float ball = SPLASH_RADIUS * SPLASH_RADIUS;
+    write(k, center, why == SPLASH ? vec3(-ball, ball, ball) : vec3(1.0), vec3(0.0));
 }
 
-// YuTurk13's ellipsoid of particle k from its sums, those of component b; center in radii.
-void write_ellipsoid(uint k, vec3 center, Sums s, uint b) {
+// The particle whose semi-axes are v's columns, so long: S = V diag(lengths^2) V^T.
+void write_ellipsoid(uint k, vec3 center, mat3 v, vec3 lengths) {
+    vec3 l = lengths * lengths;
+    vec3 r0 = vec3(v[0].x, v[1].x, v[2].x), r1 = vec3(v[0].y, v[1].y, v[2].y), r2 = vec3(v[0].z, v[1].z, v[2].z);
+    write(k, center, vec3(dot(r0 * r0, l), dot(r1 * r1, l), dot(r2 * r2, l)),
+          vec3(dot(r0 * r1, l), dot(r0 * r2, l), dot(r1 * r2, l)));
+}
+
+// Variances of a particle's neighbours around their mean, in r squared, along the columns of v; from sums, those of component b.
+vec3 variances_of(Sums s, uint b, vec3 mean, out mat3 v) {
     float unit = 1.0 / prepare.radius;
-    vec3 mean = of(s.first, b) / s.weight[b], d = of(s.diagonal, b) / s.weight[b] - mean * mean;
+    vec3 d = of(s.diagonal, b) / s.weight[b] - mean * mean;
     vec3 m = of(s.mixed_part, b) / s.weight[b] - mean.xxy * mean.yzz;
-    mat3 a = unit * unit * mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z), v;
+    mat3 a = unit * unit * mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z);
     eigen(a, v);
-    vec3 variance = vec3(a[0][0], a[1][1], a[2][2]);
+    return vec3(a[0][0], a[1][1], a[2][2]);
+}
+
+// The ellipsoid in place of particle k; center in radii. `above`: its density above the splash threshold, as a part of a
+// filled body's.
+void write_in_place(uint k, vec3 center, float above, Sums s, uint b) {
+    vec3 mean = of(s.first, b) / s.weight[b];
+    mat3 v;
+    vec3 variance = max(variances_of(s, b, mean, v), 0.0) / prepare.filled_variance + DEGENERATE_VARIANCE;
+    vec3 wanted = ELLIPSOID_SIZE * sqrt(variance * pow(variance.x * variance.y * variance.z, -1.0 / 3.0));
+    if (max(wanted.x, max(wanted.y, wanted.z)) > ELLIPSOID_WIDE) note(CLAMPED_LONG);
+    if (min(wanted.x, min(wanted.y, wanted.z)) < ELLIPSOID_THIN) note(CLAMPED_RATIO);
+    float share = clamp(above / SPLASH_FADE, 0.0, 1.0);
+    vec3 lengths = mix(vec3(SPLASH_RADIUS), clamp(wanted, ELLIPSOID_THIN, ELLIPSOID_WIDE), share);
+    mean /= prepare.radius;
+    float protrudes = 1.0 - prepare.flat_offset / max(length(mean), prepare.flat_offset);
+    write_ellipsoid(k, center + share * (ELLIPSOID_SMOOTHING + ELLIPSOID_PULL * protrudes) * mean, v, lengths);
+}
+
+// YuTurk13's.
+void write_yu_turk(uint k, vec3 center, Sums s, uint b) {
+    vec3 mean = of(s.first, b) / s.weight[b];
+    mat3 v;
+    vec3 variance = variances_of(s, b, mean, v);
     float most = max(variance.x, max(variance.y, variance.z)), least = most * prepare.least_ratio;
     if (most < DEGENERATE_VARIANCE * prepare.filled_variance) {
         write_sphere(k, center, DEGENERATE);
@@ -226,11 +259,7 @@ void write_ellipsoid(uint k, vec3 center, Sums s, uint b) {
     if (min(variance.x, min(variance.y, variance.z)) < least) note(CLAMPED_RATIO);
     vec3 wanted = max(variance, vec3(least)) / prepare.filled_variance;
     if (most / prepare.filled_variance > prepare.longest_axis) note(CLAMPED_LONG);
-    vec3 axes = min(wanted, vec3(prepare.longest_axis)), l = axes * axes;
-    // S = V diag(l) V^T
-    vec3 r0 = vec3(v[0].x, v[1].x, v[2].x), r1 = vec3(v[0].y, v[1].y, v[2].y), r2 = vec3(v[0].z, v[1].z, v[2].z);
-    write(k, center + prepare.smoothing * unit * mean, vec3(dot(r0 * r0, l), dot(r1 * r1, l), dot(r2 * r2, l)),
-          vec3(dot(r0 * r1, l), dot(r0 * r2, l), dot(r1 * r2, l)));
+    write_ellipsoid(k, center + prepare.smoothing / prepare.radius * mean, v, min(wanted, vec3(prepare.longest_axis)));
 }
 
 // Class and ellipsoid of particle k at x from its sums, those of component b.
@@ -238,13 +267,15 @@ void finish(uint k, vec3 x, Sums s, uint b) {
     vec3 origin = uintBitsToFloat(uvec3(extent.at[EXTENT_ORIGIN], extent.at[EXTENT_ORIGIN + 1], extent.at[EXTENT_ORIGIN + 2]));
     float unit = 1.0 / prepare.radius;
     vec3 center = unit * (x - origin);
-    if (!classify(k, s.density[b] / prepare.filled_density)) {
+    float relative = s.density[b] / prepare.filled_density;
+    if (!classify(k, relative)) {
         write_sphere(k, center, SPLASH);
         return;
     }
     note(BODY);
-    if (s.number[b] <= prepare.min_neighbours + 1u) write_sphere(k, center, FEW_NEIGHBOURS);
-    else write_ellipsoid(k, center, s, b);
+    if (!YU_TURK) write_in_place(k, center, relative - prepare.splash_below, s, b);
+    else if (s.number[b] <= prepare.min_neighbours + 1u) write_sphere(k, center, FEW_NEIGHBOURS);
+    else write_yu_turk(k, center, s, b);
 }
 
 // Particles that are taken together: those ranked from `from` to before `next`.

@@ -93,6 +93,8 @@ pub(crate) struct Preparation {
     pub constants: shader::Prepare,
     /// Entries of the sort: one a particle, or 27.
     pub entries: u64,
+    /// Whether ellipsoids are YuTurk13's.
+    pub yu_turk: bool,
     /// Whether classes are kept from frame to frame.
     pub keep_classes: bool,
     /// Neighbours of each particle that are listed.

@@ -11,7 +11,7 @@ use crate::{
     passes::shape::LAST_CLASSES,
     pipeline::Pipelines,
     plan::{Home, Made, Plan},
-    prepare::DevicePositions,
+    prepare::{self, DevicePositions},
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder},
     resources::{Buffer, Image, Resource, Retired, Spec},
@@ -173,7 +173,8 @@ impl Renderer {
                 (scene.splash, scene.body) = (p.count > 0, p.count > 0);
                 let constants = p.constants(p.offset % BINDING_ALIGNMENT)?;
                 let keep_classes = p.keep_class_below.is_some();
-                let made = Preparation { constants, entries: p.entries(), keep_classes, neighbours: 0 };
+                let yu_turk = p.options.ellipsoids == prepare::Fit::YuTurk;
+                let made = Preparation { constants, entries: p.entries(), yu_turk, keep_classes, neighbours: 0 };
                 scene.prepare = (p.count > 0).then_some(made);
             }
         }

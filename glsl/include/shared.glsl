@@ -89,9 +89,9 @@
 #define SORT_PASSES 20
 
 // Largest run of candidates for neighbours that is looked at whole; of a longer one evenly chosen candidates stand for all.
-// A run of five cells holds 40 in liquid at rest.
+// A run of three cells holds 24 in liquid at rest, one of five 40.
 #define CROWD 1024
-// The same for a run of the relation table: 27 cells, twice as wide, hold 1728 in liquid at rest.
+// The same for a run of the relation table: 27 cells hold 216 in liquid at rest, and twice as wide 1728.
 #define CROWD_RELATION 8192
 
 // Particles that one invocation prepares together, one in each component of a vector.
@@ -100,6 +100,22 @@
 // Neighbours whose largest variance is below this fraction of a filled body's lie on one spot: their spread says nothing about
 // a shape.
 #define DEGENERATE_VARIANCE 0.05
+
+// Ellipsoids in place (docs/methods.md), in particle radii: semi-axes where neighbours spread alike along all,
+#define ELLIPSOID_SIZE 1.55
+// the shortest
+#define ELLIPSOID_THIN 1.2
+// and the longest.
+#define ELLIPSOID_WIDE 2.0
+// Of the way to its neighbours' mean a centre goes so much,
+#define ELLIPSOID_SMOOTHING 0.1
+// and so much of what that mean lies further to one side than under a flat surface: the particle protrudes.
+#define ELLIPSOID_PULL 0.7
+// Radius of a splash, in particle radii.
+#define SPLASH_RADIUS 1.0
+// A body particle takes on its shape over so much density above the splash threshold, as parts of a filled body's; at the
+// threshold it is the splash's ball.
+#define SPLASH_FADE 0.15
 
 // Plane fitting: the least |n.v|, both of unit length, for which eq. (5) of Imai16 is trusted.
 #define FIT_GRAZING_LIMIT 0.01
@@ -203,7 +219,7 @@ struct Prepare {
     float cell_edge;
     float radius;              // particle radius r
     float support;             // h, of the number density's kernel
-    float reach;               // of the neighbours that shape ellipsoids, 2 h
+    float reach;               // of the neighbours that shape ellipsoids: h, or YuTurk13's 2 h
     float splash_below;        // a splash has less than this fraction of a filled body's density
     float keep_below;          // below this fraction the last frame's class is kept
     float filled_density;      // sum of a filled body's weights
@@ -212,7 +228,8 @@ struct Prepare {
     float least_ratio;         // 1 / largest ratio of semi-axes
     float longest_axis;        // longest semi-axis, in r
     float filled_variance;     // of a filled body's neighbours, in r squared
-    uint min_neighbours;       // with fewer a particle stays a sphere
+    float flat_offset;         // how far below a flat surface's particle the mean of its neighbours lies, in r
+    uint min_neighbours;       // with no more YuTurk13's particle stays a sphere
     uint sort_pass;
     uint has_last_classes;     // 1 if the last frame left classes
     uint cells_around;         // cells to either side of a particle's own that hold neighbours

@@ -44,6 +44,7 @@ pub(crate) fn record(
         .write("mixed", arrays.mixed)
         .counting(&COUNTED)
         .constant("RELATION_TABLE", preparation.constants.entries_per_particle != 1)
+        .constant("YU_TURK", preparation.yu_turk)
         .push_all(&preparation.constants);
     if preparation.keep_classes {
         call = call.update("last_classes", plan.array(LAST_CLASSES, 4 * count));

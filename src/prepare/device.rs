@@ -1,6 +1,11 @@
 //! Preparation on the device: positions in a buffer of the host's, and the constants that its passes take.
 
-use super::{Options, PrepareError, Search, density::rest_density, ellipsoids::lattice_variance, options::Scale};
+use super::{
+    Options, PrepareError, Search,
+    density::rest_density,
+    ellipsoids::{flat_offset, lattice_variance},
+    options::Scale,
+};
 use crate::{Error, shader::Prepare, space};
 use ash::vk;
 
@@ -52,17 +57,17 @@ impl DevicePositions {
         DevicePositions { keep_class_below: share.into(), ..self }
     }
 
-    /// Entries a particle has in the sort, and the edge of a cell in supports.
-    fn layout(&self) -> (u32, f64) {
+    /// Entries a particle has in the sort.
+    fn entries_per_particle(&self) -> u32 {
         match self.options.search {
-            Search::Runs => (1, 1.0),
-            Search::Relation => (27, 2.0),
+            Search::Runs => 1,
+            Search::Relation => 27,
         }
     }
 
     /// Entries of the sort.
     pub fn entries(&self) -> u64 {
-        u64::from(self.count) * u64::from(self.layout().0)
+        u64::from(self.count) * u64::from(self.entries_per_particle())
     }
 
     /// Checks radius, options, offset and stride, and makes the passes' constants; `begin` is what is left of the offset
@@ -84,30 +89,36 @@ impl DevicePositions {
         if self.keep_class_below.is_some_and(f32::is_nan) {
             return Err(Error::parameter("upper splash threshold", f32::NAN, "use a number"));
         }
-        let (entries, supports) = self.layout();
+        // Sorted cells are as wide as the support, those of the relation table as the reach.
+        let cell_edge = match self.options.search {
+            Search::Runs => scale.support,
+            Search::Relation => scale.reach,
+        };
+        let reach = scale.reach / scale.radius;
         let power = space::power_of_two(self.radius);
         let o = &self.options;
         Ok(Prepare {
             count: self.count,
             first_word: (begin / 4) as u32,
             word_stride: (self.stride / 4) as u32,
-            entries_per_particle: entries,
-            cell_edge: (scale.support * supports) as f32 * power,
+            entries_per_particle: self.entries_per_particle(),
+            cell_edge: cell_edge as f32 * power,
             radius: self.radius * power,
             support: scale.support as f32 * power,
-            reach: scale.reach() as f32 * power,
+            reach: scale.reach as f32 * power,
             splash_below: o.splash_threshold,
             keep_below: self.keep_class_below.unwrap_or(o.splash_threshold),
             filled_density: rest_density(scale.support / scale.radius) as f32,
             unit_scale: power,
             smoothing: o.smoothing,
             least_ratio: o.max_ratio.recip(),
-            longest_axis: o.max_semi_axis,
-            filled_variance: lattice_variance(scale.reach() / scale.radius) as f32,
+            longest_axis: o.longest(),
+            filled_variance: lattice_variance(reach) as f32,
+            flat_offset: flat_offset(reach) as f32,
             min_neighbours: u32::try_from(o.min_neighbours).unwrap_or(u32::MAX).min(u32::MAX - 1),
             sort_pass: 0,
             has_last_classes: 0,
-            cells_around: (2.0 / supports) as u32,
+            cells_around: (scale.reach / cell_edge).ceil() as u32,
         })
     }
 }

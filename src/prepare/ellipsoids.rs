@@ -1,11 +1,17 @@
-//! Anisotropic kernels: an ellipsoid for each particle of the body (YuTurk13).
+//! An ellipsoid for each particle of the body: in place, or an anisotropic kernel (YuTurk13).
 
 use glam::{DMat3, DVec3};
 
-use super::density::lattice;
+use super::density::{lattice, rest_density, spline};
 use super::neighbours::{Grid, Neighbour};
-use super::options::{Options, Scale};
-use crate::{particles::Ellipsoid, shader::DEGENERATE_VARIANCE};
+use super::options::{Fit, Options, Scale};
+use crate::{
+    particles::Ellipsoid,
+    shader::{
+        DEGENERATE_VARIANCE, ELLIPSOID_PULL, ELLIPSOID_SIZE, ELLIPSOID_SMOOTHING, ELLIPSOID_THIN, ELLIPSOID_WIDE,
+        SPLASH_FADE, SPLASH_RADIUS,
+    },
+};
 
 /// How an ellipsoid came about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +23,7 @@ pub(super) enum Shape {
     /// A sphere: the neighbours coincide.
     Degenerate,
     /// Fitted; whether a semi-axis was cut to the longest allowed, and whether one was raised to
-    /// the largest ratio allowed.
+    /// the shortest, or to the largest ratio allowed.
     Fitted { long: bool, ratio: bool },
 }
 
@@ -39,46 +45,107 @@ pub fn lattice_variance(reach: f64) -> f64 {
     squares / sum
 }
 
-/// Fits the ellipsoid of each particle from its neighbours within twice the support.
+/// How far below a particle on the flat surface of a filled body's [`lattice`] the weighted mean of its neighbours lies;
+/// `reach` and the result in particle radii.
+pub fn flat_offset(reach: f64) -> f64 {
+    let (mut sum, mut offset) = (0.0, 0.0);
+    for point in lattice(reach).filter(|p| p.z <= 0.0) {
+        let w = weight(point.length(), reach);
+        sum += w;
+        offset -= w * point.z;
+    }
+    offset / sum
+}
+
+/// Fits the ellipsoid of each particle from its neighbours within the reach.
 pub(super) struct Fitter<'a> {
     grid: &'a Grid,
     options: &'a Options,
     scale: Scale,
+    /// A filled body's variance, density (both as of [`Sums`]), and offset below a flat surface, in world units.
     full: f64,
+    filled: f64,
+    flat: f64,
+}
+
+/// Weighted sums over a particle's neighbours, divided by the weights' sum; offsets are measured from the particle, so that
+/// nothing is lost far from the origin.
+struct Sums {
+    mean: DVec3,
+    squares: DMat3,
+    /// Number density, as a part of a filled body's.
+    density: f64,
 }
 
 impl<'a> Fitter<'a> {
     pub fn new(grid: &'a Grid, scale: Scale, options: &'a Options) -> Self {
-        let full = lattice_variance(scale.reach() / scale.radius) * scale.radius.powi(2);
-        Self { grid, options, scale, full }
+        let (reach, radius) = (scale.reach / scale.radius, scale.radius);
+        let full = lattice_variance(reach) * radius.powi(2);
+        let filled = rest_density(scale.support / radius);
+        Self { grid, options, scale, full, filled, flat: flat_offset(reach) * radius }
     }
 
-    /// YuTurk13 §4 with the eigenvalues themselves, not their roots, as lengths. Particle `i`
-    /// counts in the mean and the covariance with weight 1, but not as its own neighbour.
+    /// Particle `i`'s ellipsoid. It counts in its own sums with weight 1.
+    pub fn fit(&self, i: usize, near: &[Neighbour]) -> (Ellipsoid, Shape) {
+        match self.options.ellipsoids {
+            Fit::InPlace => self.in_place(i, near),
+            Fit::YuTurk => self.yu_turk(i, near),
+        }
+    }
+
+    fn sums(&self, i: usize, near: &[Neighbour]) -> Sums {
+        let origin = self.grid.positions[i].as_dvec3();
+        let (mut sum, mut mean, mut squares, mut density) = (0.0, DVec3::ZERO, DMat3::ZERO, 0.0);
+        for j in near {
+            let offset = self.grid.positions[j.index as usize].as_dvec3() - origin;
+            let weight = f64::from(j.count) * weight(offset.length(), self.scale.reach);
+            let weighted = offset * weight;
+            sum += weight;
+            mean += weighted;
+            squares += outer(offset, weighted);
+            density += f64::from(j.count) * spline(offset.length() / self.scale.support);
+        }
+        Sums { mean: mean / sum, squares: squares * (1.0 / sum), density: density / self.filled }
+    }
+
+    /// Semi-axes follow how neighbours spread along one direction against the others, whatever their spacing: balls inside,
+    /// flat on a surface or in a sheet, long in a jet. Their lengths are such that the mean height of a surface, dents
+    /// between particles included, is that of the liquid's: what is drawn is these ellipsoids, not a field around them.
+    ///
+    /// Centres follow their neighbours a little, and more where these lie further to one side than under a flat surface: such
+    /// a particle protrudes. One with hardly more density than a splash has hardly another shape.
+    fn in_place(&self, i: usize, near: &[Neighbour]) -> (Ellipsoid, Shape) {
+        let Sums { mean, squares, density } = self.sums(i, near);
+        let (variances, frame) = eigen_symmetric(squares - outer(mean, mean));
+        // The addend makes nothing of a spread of nothing.
+        let variances = variances.max(DVec3::ZERO) / self.full + f64::from(DEGENERATE_VARIANCE);
+        let spread = (variances / variances.element_product().cbrt()).map(f64::sqrt);
+        let [size, thin, wide] = [ELLIPSOID_SIZE, ELLIPSOID_THIN, ELLIPSOID_WIDE].map(f64::from);
+        let [splash, fade] = [SPLASH_RADIUS, SPLASH_FADE].map(f64::from);
+        let [smoothing, pull] = [ELLIPSOID_SMOOTHING, ELLIPSOID_PULL].map(f64::from);
+        let wanted = spread * size;
+        let share = ((density - f64::from(self.options.splash_threshold)) / fade).clamp(0.0, 1.0);
+        let lengths = DVec3::splat(splash).lerp(wanted.clamp(DVec3::splat(thin), DVec3::splat(wide)), share);
+        let protrudes = (1.0 - self.flat / mean.length()).max(0.0); // 0 of a mean of 0
+        let center = self.grid.positions[i].as_dvec3() + mean * (share * (smoothing + pull * protrudes));
+        let axes = (frame * DMat3::from_diagonal(lengths * self.scale.radius)).as_mat3();
+        let shape = Shape::Fitted { long: wanted.x > wide, ratio: wanted.z < thin };
+        (Ellipsoid { center: center.as_vec3(), axes }, shape)
+    }
+
+    /// YuTurk13 §4 with the eigenvalues themselves, not their roots, as lengths.
     ///
     /// As in the paper, liquid shrinks: with the defaults the outermost centres of a flat surface
     /// sink by 1.85 r, the next layer by 0.94 r, and a lone block of 27 particles from 6 r to
     /// 1.25 r across. A smaller support or λ takes less.
-    pub fn fit(&self, i: usize, near: &[Neighbour]) -> (Ellipsoid, Shape) {
+    fn yu_turk(&self, i: usize, near: &[Neighbour]) -> (Ellipsoid, Shape) {
         let (center, radius) = (self.grid.positions[i], self.scale.radius);
         let sphere = super::sphere(center, radius as f32);
         if near.iter().map(|j| j.count as usize).sum::<usize>() <= self.options.min_neighbours + 1 {
             return (sphere, Shape::FewNeighbours);
         }
-
-        // Offsets from the particle itself, so that nothing is lost far from the origin.
-        let origin = center.as_dvec3();
-        let (mut sum, mut mean, mut covariance) = (0.0, DVec3::ZERO, DMat3::ZERO);
-        for j in near {
-            let offset = self.grid.positions[j.index as usize].as_dvec3() - origin;
-            let weight = f64::from(j.count) * weight(offset.length(), self.scale.reach());
-            let weighted = offset * weight;
-            sum += weight;
-            mean += weighted;
-            covariance += outer(offset, weighted);
-        }
-        mean /= sum;
-        let (variances, frame) = eigen_symmetric(covariance * (1.0 / sum) - outer(mean, mean));
+        let Sums { mean, squares, .. } = self.sums(i, near);
+        let (variances, frame) = eigen_symmetric(squares - outer(mean, mean));
         if variances.x < f64::from(DEGENERATE_VARIANCE) * self.full {
             return (sphere, Shape::Degenerate);
         }
@@ -87,7 +154,7 @@ impl<'a> Fitter<'a> {
         let wanted = variances.max(DVec3::splat(least)) * (radius / self.full);
         let longest = radius * f64::from(self.options.max_semi_axis);
         let lengths = wanted.min(DVec3::splat(longest));
-        let center = origin + mean * f64::from(self.options.smoothing);
+        let center = center.as_dvec3() + mean * f64::from(self.options.smoothing);
         let axes = (frame * DMat3::from_diagonal(lengths)).as_mat3();
         let shape = Shape::Fitted { long: wanted.x > longest, ratio: variances.z < least };
         (Ellipsoid { center: center.as_vec3(), axes }, shape)

@@ -18,10 +18,13 @@ use glam::{Mat3, Vec3};
 pub use density::{DensityField, classify};
 pub use device::DevicePositions;
 pub use neighbours::Search;
-pub use options::Options;
+pub use options::{Fit, Options};
 pub use spacing::estimate_radius;
 
-use crate::particles::{Class, Ellipsoid, Particles};
+use crate::{
+    particles::{Class, Ellipsoid, Particles},
+    shader::SPLASH_RADIUS,
+};
 use ellipsoids::{Fitter, Shape};
 use neighbours::Grid;
 use options::Scale;
@@ -52,7 +55,7 @@ pub struct Report {
     pub degenerate: usize,
     /// Cut to the longest semi-axis.
     pub clamped_long: usize,
-    /// Thickened to the largest ratio.
+    /// Thickened to the shortest semi-axis, or with YuTurk13's fit to the largest ratio.
     pub clamped_ratio: usize,
 }
 
@@ -115,8 +118,8 @@ pub fn prepare(input: &Input, options: &Options) -> Result<(Particles, Report), 
     prepare_with_progress(input, options, &|_| ())
 }
 
-/// Classifies particles by number density (Imai16 §4.1), and gives those of the body their
-/// anisotropic ellipsoids (YuTurk13) and a splash a sphere, splashes first.
+/// Classifies particles by number density (Imai16 §4.1), and gives those of the body the ellipsoids
+/// of [`Options::ellipsoids`] and a splash a sphere, splashes first.
 ///
 /// `progress` is told how many particles are done, now and then, from any thread and not always in
 /// order; the last number is the count of particles. An ellipsoid given for a splash is ignored.
@@ -175,13 +178,13 @@ fn prepare_all(
         None => {
             let fitter = Fitter::new(&grid, scale, options);
             let done = AtomicUsize::new(0);
-            grid.map_neighbours(scale.reach(), options.search, |i, near| {
+            grid.map_neighbours(scale.reach, options.search, |i, near| {
                 let before = done.fetch_add(1, Ordering::Relaxed);
                 if before % 4096 == 4095 {
                     progress(before + 1);
                 }
                 match classes[i] {
-                    Class::Splash => (sphere(grid.positions[i], radius), Shape::Given),
+                    Class::Splash => (splash(grid.positions[i], radius), Shape::Given),
                     Class::Body => fitter.fit(i, near),
                 }
             })
@@ -197,6 +200,10 @@ fn prepare_all(
     };
     let speeds = of_class(Class::Splash).chain(of_class(Class::Body)).collect();
     Ok((particles, report, speeds))
+}
+
+fn splash(center: Vec3, radius: f32) -> Ellipsoid {
+    sphere(center, SPLASH_RADIUS * radius)
 }
 
 fn sphere(center: Vec3, radius: f32) -> Ellipsoid {
@@ -215,7 +222,7 @@ fn given_shapes(
     let mut bad = None;
     for ((&index, &center), class) in grid.order.iter().zip(&grid.positions).zip(classes) {
         let index = index as usize;
-        let mut ellipsoid = sphere(center, radius);
+        let mut ellipsoid = splash(center, radius);
         if *class == Class::Body {
             ellipsoid.axes = given[index];
             if !is_ellipsoid(&given[index]) && bad.is_none_or(|bad| index < bad) {

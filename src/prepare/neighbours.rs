@@ -135,7 +135,7 @@ impl Grid {
     /// Calls `f(i, neighbours)` for every particle, in parallel, and returns the answers in order.
     /// Neighbours are strictly nearer than `radius`, ascend, and include `i` itself. They are all of them where no run of
     /// cells that differ in z alone holds more than 1024 particles (in the relation table, where no 27 cells hold more
-    /// than 8192): twenty-five times what liquid at rest has there.
+    /// than 8192): forty times what liquid at rest has in three cells, twenty-five times what it has in five.
     pub fn map_neighbours<T: Send>(
         &self,
         radius: f64,

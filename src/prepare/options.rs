@@ -4,9 +4,21 @@ use super::PrepareError;
 use super::neighbours::Search;
 use crate::{
     Error, Parameters,
-    parameters::{Value, parameters},
+    parameters::{Value, choices, parameters},
+    shader::ELLIPSOID_WIDE,
     space,
 };
+
+choices! {
+    /// How ellipsoids are fitted to a body particle's neighbours.
+    pub enum Fit {
+        /// Around the particle itself, so that the liquid's surface stays where it is.
+        #[default]
+        InPlace = "in-place",
+        /// Around the neighbours' mean (YuTurk13): liquid shrinks.
+        YuTurk = "yu-turk",
+    }
+}
 
 parameters! {
     []
@@ -20,24 +32,39 @@ parameters! {
             => |h| h.is_none_or(|h| h.is_finite() && h > 0.0);
         /// Particles with less than this share of a filled body's density are splash: τ (Imai16 §4.1)
         splash_threshold: f32 = 0.48, "", "a number" => |t| !t.is_nan();
-        /// How far a centre moves to its neighbours' mean: λ (YuTurk13)
+        /// How a body particle's ellipsoid is fitted: in place, or as YuTurk13 has it, which shrinks the liquid
+        ellipsoids: Fit = Fit::InPlace, "", "in-place or yu-turk" => |_| true;
+        /// With yu-turk: how far a centre moves to its neighbours' mean, λ
         smoothing: f32 = 0.9, "", "0 to 1" => |s| (0.0..=1.0).contains(s);
-        /// Largest ratio of two semi-axes: k_r (YuTurk13)
+        /// With yu-turk: largest ratio of two semi-axes, k_r
         max_ratio: f32 = 4.0, "", "1 to 1000" => |r| (1.0..=1e3).contains(r);
-        /// A body particle with this many neighbours or fewer stays a sphere (YuTurk13)
+        /// With yu-turk: a body particle with this many neighbours or fewer stays a sphere
         min_neighbours: usize = 25, "", "0 to 1000000" => |n| *n <= 1_000_000;
-        /// Longest semi-axis (Imai16 §4.2)
+        /// With yu-turk: longest semi-axis (Imai16 §4.2)
         max_semi_axis: f32 = 1.2, "particle radii", "0.01 to 100" => |a| (0.01..=100.0).contains(a);
         /// How neighbours are found; the result is the same
         search: Search = Search::Runs, "", "runs or relation (Im16's table)" => |_| true;
     }
 }
 
-/// Radius and support h, in world units.
+impl Options {
+    /// Longest semi-axis of a body particle, in particle radii.
+    pub fn longest(&self) -> f32 {
+        match self.ellipsoids {
+            Fit::InPlace => ELLIPSOID_WIDE,
+            Fit::YuTurk => self.max_semi_axis,
+        }
+    }
+}
+
+/// Lengths in world units.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
     pub radius: f64,
+    /// The density's support h.
     pub support: f64,
+    /// Within what distance neighbours shape an ellipsoid.
+    pub reach: f64,
 }
 
 impl Scale {
@@ -51,12 +78,13 @@ impl Scale {
         if !(2.0..=64.0).contains(&(support / radius)) {
             return Err(Error::parameter("support", support.text(), "use 2 to 64 radii").into());
         }
-        Ok(Self { radius: f64::from(radius), support: f64::from(support) })
-    }
-
-    /// Within what distance neighbours shape an ellipsoid (YuTurk13: 2 h).
-    pub fn reach(self) -> f64 {
-        2.0 * self.support
+        let (radius, support) = (f64::from(radius), f64::from(support));
+        let reach = match options.ellipsoids {
+            // Closer by lie too few to tell a shape.
+            Fit::InPlace => support.max(4.0 * radius),
+            Fit::YuTurk => 2.0 * support,
+        };
+        Ok(Self { radius, support, reach })
     }
 }
 

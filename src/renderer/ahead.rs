@@ -84,13 +84,15 @@ impl Renderer {
             }
         }
         for search in [Search::Runs, Search::Relation] {
-            for keep in [None, Some(1.0)] {
-                let options = prepare::Options { search, ..Default::default() };
-                let positions =
-                    DevicePositions::packed(vk::Buffer::null(), 1, 1.0).options(options).keep_class_below(keep);
-                let mut scene = scene([0, 0]);
-                self.fill(&mut scene, Amount::OnDevice(&positions))?;
-                scenes.push(scene);
+            for ellipsoids in [prepare::Fit::InPlace, prepare::Fit::YuTurk] {
+                for keep in [None, Some(1.0)] {
+                    let options = prepare::Options { search, ellipsoids, ..Default::default() };
+                    let positions =
+                        DevicePositions::packed(vk::Buffer::null(), 1, 1.0).options(options).keep_class_below(keep);
+                    let mut scene = scene([0, 0]);
+                    self.fill(&mut scene, Amount::OnDevice(&positions))?;
+                    scenes.push(scene);
+                }
             }
         }
         let plans: Vec<_> = scenes.iter().map(frame::plan).collect::<Result<_, _>>()?;

@@ -6,7 +6,7 @@ use meniscus::{
         budget::Budget,
         particles::{Invalid, ParticleFile, ReadError, check_finite, read_bytes},
     },
-    prepare::{self, Input, Options, PrepareError},
+    prepare::{self, Fit, Input, Options, PrepareError},
 };
 use std::path::Path;
 
@@ -152,9 +152,10 @@ fn speeds_go_with_their_particles() {
     let speed_of = |p: Vec3| 1.0 + p.x + 10.0 * p.y + 100.0 * p.z;
     let mut velocities: Vec<Vec3> = positions.iter().map(|p| speed_of(*p) * Vec3::new(0.6, 0.0, -0.8)).collect();
     *velocities.last_mut().expect("one") *= 2.0;
+    let centres_stay = Options::default().ellipsoids(Fit::YuTurk).smoothing(0.0);
     let run = |positions: &[Vec3], velocities: &[Vec3]| {
         let input = Input { positions, radius: 0.05, classes: None, ellipsoids: None };
-        prepare::prepare_with_velocities(&input, velocities, &Options::default().smoothing(0.0), &|_| ())
+        prepare::prepare_with_velocities(&input, velocities, &centres_stay, &|_| ())
     };
     let (particles, report, speeds) = run(&positions, &velocities).expect("it prepares");
     assert!(report.splash >= 20 && report.body > 400, "{report:?}");
@@ -170,7 +171,7 @@ fn speeds_go_with_their_particles() {
     velocities.reverse();
     assert_eq!(run(&positions, &velocities).expect("it prepares"), (particles.clone(), report, speeds));
     let still = Input { positions: &positions, radius: 0.05, classes: None, ellipsoids: None };
-    assert_eq!(prepare::prepare(&still, &Options::default().smoothing(0.0)).expect("it prepares").0, particles);
+    assert_eq!(prepare::prepare(&still, &centres_stay).expect("it prepares").0, particles);
 
     assert!(matches!(run(&positions, &velocities[1..]), Err(PrepareError::Length { what: "velocities", .. })));
     velocities[3].y = f32::INFINITY;

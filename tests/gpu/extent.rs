@@ -3,7 +3,7 @@
 use crate::support::{Cloud, each_driver};
 use glam::Vec3;
 use meniscus::{
-    prepare::Search,
+    prepare::{Fit, Search},
     shader::{
         EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_LEAST, EXTENT_MOST, EXTENT_ORIGIN, EXTENT_PASSES,
     },
@@ -18,9 +18,15 @@ fn boxes_cells_and_bits_are_the_twins() {
             for lost in [0, 3] {
                 // Positions that are not finite count for nothing.
                 positions.extend([Vec3::NAN, Vec3::INFINITY, Vec3::new(0.0, f32::NEG_INFINITY, 0.0)].iter().take(lost));
-                for (search, edge, more) in [(Search::Runs, 4.0, 0), (Search::Relation, 8.0, 1)] {
+                for (ellipsoids, search, edge, more) in [
+                    (Fit::InPlace, Search::Runs, 4.0, 0),
+                    (Fit::InPlace, Search::Relation, 4.0, 1),
+                    (Fit::YuTurk, Search::Relation, 8.0, 1),
+                ] {
                     let want = extent(&positions, edge * radius, more);
-                    let shot = driver.shoot_cloud(&crate::shape::empty(radius), &Cloud::new(&positions, search));
+                    let mut cloud = Cloud::new(&positions, search);
+                    cloud.options.ellipsoids = ellipsoids;
+                    let shot = driver.shoot_cloud(&crate::shape::empty(radius), &cloud);
                     let words = shot.words("extent", 0).expect("extent");
                     let three = |at: u32| <[u32; 3]>::try_from(&words[at as usize..][..3]).expect("three words");
                     let origin = three(EXTENT_ORIGIN).map(f32::from_bits);

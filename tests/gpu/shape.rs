@@ -5,7 +5,7 @@ use crate::support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_dri
 use glam::Vec3;
 use meniscus::{
     Class, Particles, Settings,
-    prepare::{Input, Options, Search, classify, prepare},
+    prepare::{Fit, Input, Options, Search, classify, prepare},
     twin::shape::neighbours,
 };
 
@@ -86,17 +86,21 @@ fn listed(shot: &Shot, count: usize) -> (Vec<Vec<u32>>, Vec<usize>) {
 fn neighbours_are_the_same_sets() {
     each_driver(|driver| {
         for (name, radius, positions) in clouds() {
-            // Two supports.
-            let want = neighbours(&positions, 8.0 * radius);
-            let total: usize = want.iter().map(Vec::len).sum();
-            for search in [Search::Runs, Search::Relation] {
-                let shot = driver.shoot_cloud(&empty(radius), &Cloud::new(&positions, search));
-                let (got, _) = listed(&shot, positions.len());
-                for (i, (got, want)) in got.iter().zip(&want).enumerate() {
-                    assert!(got == want, "{}: {name}: {search:?}: particle {i}: {got:?}, not {want:?}", driver.name);
+            for (ellipsoids, supports) in [(Fit::InPlace, 1.0), (Fit::YuTurk, 2.0)] {
+                let want = neighbours(&positions, supports * 4.0 * radius);
+                let total: usize = want.iter().map(Vec::len).sum();
+                for search in [Search::Runs, Search::Relation] {
+                    let options = Options { ellipsoids, search, ..Options::default() };
+                    let cloud = Cloud { options, ..Cloud::new(&positions, search) };
+                    let shot = driver.shoot_cloud(&empty(radius), &cloud);
+                    let (got, _) = listed(&shot, positions.len());
+                    let label = format!("{}: {name}: {ellipsoids:?}: {search:?}", driver.name);
+                    for (i, (got, want)) in got.iter().zip(&want).enumerate() {
+                        assert!(got == want, "{label}: particle {i}: {got:?}, not {want:?}");
+                    }
                 }
+                println!("{}: {name}: {} particles, {total} neighbours", driver.name, positions.len());
             }
-            println!("{}: {name}: {} particles, {total} neighbours", driver.name, positions.len());
         }
     });
 }
@@ -163,8 +167,16 @@ fn classes_and_ellipsoids_are_the_cpus() {
             for search in [Search::Runs, Search::Relation] {
                 agrees(driver, name, radius, &positions, &Options { search, ..Options::default() }, tolerance);
             }
-            let other = Options { smoothing: 0.5, max_ratio: 2.0, min_neighbours: 3, ..Options::default() };
-            agrees(driver, name, radius, &positions, &other, tolerance);
+            let yu_turk = Options::default().ellipsoids(Fit::YuTurk);
+            agrees(driver, name, radius, &positions, &yu_turk, tolerance);
+            for other in [
+                Options { smoothing: 0.5, max_ratio: 2.0, min_neighbours: 3, search: Search::Relation, ..yu_turk },
+                // Two cells around, not one; and a wider fade.
+                Options { support: Some(3.0 * radius), ..Options::default() },
+                Options { support: Some(6.0 * radius), splash_threshold: 0.7, ..Options::default() },
+            ] {
+                agrees(driver, name, radius, &positions, &other, tolerance);
+            }
         }
     });
 }
@@ -262,8 +274,48 @@ fn what_is_not_finite_is_left_out() {
             let nothing =
                 shot.floats("particle shapes (diagonal)", 0).expect("shapes").chunks(3).filter(|d| d[0] == 0.0).count();
             assert_eq!(nothing, holed.len() - finite.len(), "{}: {search:?}", driver.name);
-            assert_eq!(listed(&shot, holed.len()).0, neighbours(&holed, 8.0 * radius), "{}: {search:?}", driver.name);
+            assert_eq!(listed(&shot, holed.len()).0, neighbours(&holed, 4.0 * radius), "{}: {search:?}", driver.name);
             assert!(shot.picture.iter().flatten().all(|v| v.is_finite()), "{}", driver.name);
+        }
+    });
+}
+
+/// Flat bodies of some layers, looked at along their normal: the front map lies where the liquid's surface is, one radius
+/// above the outermost centres, before smoothing and after, and has no gaps. With YuTurk13's fit it lies far below.
+#[test]
+fn the_surface_is_where_the_liquids_is() {
+    let (radius, distance, size) = (0.05, 3.0, [160, 120]);
+    let case = Case { camera: camera(Vec3::Z * distance, Vec3::ZERO, size), size, ..empty(radius) };
+    let slab = |layers: i32| {
+        let mut random = Random(21);
+        let flat = move |z: i32| {
+            (0..441).map(move |i| 2.0 * radius * Vec3::new((i % 21 - 10) as f32, (i / 21 - 10) as f32, z as f32))
+        };
+        let lattice = (1 - layers..=0).flat_map(flat);
+        lattice.map(|p| p + 0.25 * radius * random.point(Vec3::NEG_ONE, Vec3::ONE)).collect::<Vec<_>>()
+    };
+    each_driver(|driver| {
+        for (layers, ellipsoids) in
+            [(1, Fit::InPlace), (2, Fit::InPlace), (3, Fit::InPlace), (8, Fit::InPlace), (8, Fit::YuTurk)]
+        {
+            let positions = slab(layers);
+            let options = Options::default().ellipsoids(ellipsoids);
+            let cloud = Cloud { options, ..Cloud::new(&positions, Search::Runs) };
+            let shot = driver.shoot_cloud_unlisted(&case, &cloud);
+            for map in ["body depth (ray-cast)", "body depth (smoothed, odd)"] {
+                let depths = shot.depths(map, 0).expect("drawn");
+                // The middle of the picture: half of the slab's width.
+                let middle = |i: &usize| (i % 160).abs_diff(80) < 24 && (i / 160).abs_diff(60) < 24;
+                let seen: Vec<f32> =
+                    (0..depths.len()).filter(middle).map(|i| (distance - depths[i]) / radius - 1.0).collect();
+                let (surface, gaps): (Vec<f32>, Vec<f32>) = seen.iter().partition(|e| (-2.0..2.0).contains(*e));
+                let error = surface.iter().sum::<f32>() / surface.len() as f32;
+                let gaps = gaps.len() as f32 / seen.len() as f32;
+                let label = format!("{}: {layers} layers, {ellipsoids:?}, {map}: {error} r, {gaps} gaps", driver.name);
+                println!("{label}");
+                let right = if ellipsoids == Fit::YuTurk { gaps > 0.5 } else { error.abs() <= 0.2 && gaps <= 0.01 };
+                assert!(right, "{label}");
+            }
         }
     });
 }

@@ -25,11 +25,11 @@ fn entries_are_in_the_twins_order() {
     each_driver(|driver| {
         let mut most = 0;
         for (name, radius, positions) in crate::shape::clouds() {
-            // A cell is as wide as the support, four radii; of the relation table twice that.
+            // A cell is as wide as the support, four radii, and so is one of the relation table.
             let (runs, passes) = order(driver, &positions, radius, Search::Runs);
             assert_eq!(runs, sort(&positions, 4.0 * radius), "{}: {name}", driver.name);
             let (table, more) = order(driver, &positions, radius, Search::Relation);
-            assert_eq!(table, relation(&positions, 8.0 * radius), "{}: {name}: relation", driver.name);
+            assert_eq!(table, relation(&positions, 4.0 * radius), "{}: {name}: relation", driver.name);
             println!("{}: {name}: {passes} and {more} passes", driver.name);
             most = most.max(passes);
         }

@@ -29,7 +29,7 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     let (centers, diagonals, mixed) =
         (array("particle centres")?, array("particle shapes (diagonal)")?, array("particle shapes (mixed)")?);
     let order = order(session, centers.len())?;
-    let sphere = Mat3::from_diagonal(Vec3::splat(radius));
+    let sphere = Mat3::from_diagonal(Vec3::splat(radius * s::SPLASH_RADIUS));
     let space = words(session, "extent")?;
     let space = if space.is_empty() { Space::new(radius, Vec3::ZERO) } else { Space::prepared(radius, &space) };
     let (mut splash, mut body) = (Vec::new(), Vec::new());

@@ -9,6 +9,7 @@ use meniscus::{
     host::{Session, Upload},
     io::particles::{Invalid, check_finite, read_bytes, read_within},
     prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
+    shader,
 };
 use serde::{Deserialize, Serialize};
 use std::{error::Error, path::Path, time::Duration};
@@ -200,7 +201,7 @@ fn make(input: &Input, velocities: Option<&[Vec3]>, options: &Options, how: Prep
 /// Spheres as large as any ellipsoid that the device may make: for the camera, and for the box around the liquid.
 fn uniform(input: &Input, options: &Options) -> Particles {
     let radius = input.radius;
-    let axes = Mat3::from_diagonal(Vec3::splat(radius * options.max_semi_axis));
+    let axes = Mat3::from_diagonal(Vec3::splat(radius * options.longest().max(shader::SPLASH_RADIUS)));
     let ellipsoids = input.positions.iter().map(|p| Ellipsoid { center: *p, axes }).collect();
     Particles { radius, ellipsoids, splash_count: 0 }
 }

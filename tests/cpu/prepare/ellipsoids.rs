@@ -1,11 +1,11 @@
-//! Ellipsoids of known and of awkward neighbourhoods, and the eigen-solver.
+//! Ellipsoids of known and of awkward neighbourhoods, and the eigen-solver. Where they put the surface: `surfaces.rs`.
 
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use meniscus::particles::Ellipsoid;
 use meniscus::prepare::ellipsoids::eigen_symmetric;
-use meniscus::prepare::{Options, Report, prepare};
+use meniscus::prepare::{Fit, Options, Report, prepare};
 
-use super::{Random, block, input, run};
+use super::{Random, block, input};
 
 #[test]
 fn eigen_solver_reconstructs() {
@@ -40,9 +40,13 @@ fn eigen_solver_reconstructs() {
     }
 }
 
-/// With no splash, no smoothing: the body ellipsoid of the particle at `at` keeps its centre.
+fn yu_turk() -> Options {
+    Options::default().ellipsoids(Fit::YuTurk)
+}
+
+/// With no splash, no smoothing: YuTurk13's ellipsoid of the particle at `at` keeps its centre.
 fn body_at(positions: &[Vec3], at: Vec3) -> Ellipsoid {
-    let options = Options { splash_threshold: 0.0, smoothing: 0.0, ..Options::default() };
+    let options = yu_turk().splash_threshold(0.0).smoothing(0.0);
     let (particles, _) = prepare(&input(positions, 1.0), &options).unwrap();
     *particles.ellipsoids.iter().find(|e| e.center == at).unwrap()
 }
@@ -54,7 +58,7 @@ fn inside_a_lattice_the_ellipsoid_is_the_sphere() {
         let Ellipsoid { axes, .. } = body_at(&cube, offset);
         let square = axes * axes.transpose();
         assert!(square.abs_diff_eq(Mat3::IDENTITY, 1e-5), "{square}");
-        let smoothed = run(&cube, 1.0).0.ellipsoids;
+        let smoothed = prepare(&input(&cube, 1.0), &yu_turk()).unwrap().0.ellipsoids;
         let stays = |e: &Ellipsoid| e.center.abs_diff_eq(offset, 1e-6);
         assert!(smoothed.iter().any(stays), "the centre stays");
     }
@@ -70,7 +74,7 @@ fn on_a_flat_surface_the_ellipsoid_is_flattened_along_the_normal() {
     assert!((lengths[0] - lengths[1]).abs() < 1e-3 && lengths[0] > 0.95, "{lengths:?}");
     assert!((0.25..0.5).contains(&lengths[2]), "{lengths:?}");
     // The smoothed centre moves straight down, by about a spacing.
-    let (particles, _) = run(&slab, 1.0);
+    let (particles, _) = prepare(&input(&slab, 1.0), &yu_turk()).unwrap();
     let axis = |e: &&Ellipsoid| e.center.x.abs() < 1e-4 && e.center.z.abs() < 1e-4;
     let column = particles.ellipsoids.iter().filter(axis).map(|e| e.center.y);
     let top = column.clone().fold(f32::NEG_INFINITY, f32::max);
@@ -87,7 +91,7 @@ fn smoothing_moves_to_the_weighted_mean() {
         let ring = Vec3::new(angle.cos(), angle.sin(), 0.0) + Vec3::Z * 1.5;
         cloud.push(ring * if k % 2 == 0 { 1.0 } else { 2.0 });
     }
-    let options = Options { splash_threshold: 0.0, smoothing: 0.5, ..Options::default() };
+    let options = yu_turk().splash_threshold(0.0).smoothing(0.5);
     let (particles, _) = prepare(&input(&cloud, 1.0), &options).unwrap();
     let weight = |p: &DVec3| 1.0 - (p.length() / 8.0).powi(3);
     let points = cloud.iter().map(|p| p.as_dvec3());
@@ -115,22 +119,29 @@ fn awkward_clouds_give_no_nan_hole_or_needle() {
     clouds.push(("two heaps".into(), pair));
     let lone = [vec![Vec3::ZERO; 50], vec![Vec3::X * 7.9]].concat();
     clouds.push(("a heap and one".into(), lone));
-    for radius in [1.0, 1e-12, 1e12] {
-        for threshold in [0.0, 0.48, f32::INFINITY] {
-            for (name, cloud) in &clouds {
-                let cloud: Vec<_> = cloud.iter().map(|p| p * radius).collect();
-                let options = Options { splash_threshold: threshold, ..Options::default() };
-                let (particles, report) = prepare(&input(&cloud, radius), &options).unwrap();
-                assert_eq!(particles.ellipsoids.len(), cloud.len(), "{name}: no hole");
-                assert_eq!(report.splash + report.body, cloud.len());
-                assert_eq!(particles.splash_count, report.splash);
-                for (k, e) in particles.ellipsoids.iter().enumerate() {
-                    assert!(e.center.is_finite() && e.axes.is_finite(), "{name}: {e:?}");
-                    let lengths = e.axes.to_cols_array_2d().map(|a| Vec3::from(a).length() / radius);
-                    let (long, short) = (lengths[0].max(lengths[1]), lengths[2]);
-                    assert!(long < 1.2001 && short > 0.0124 && long < 4.001 * short, "{name}: {e:?}");
-                    assert!(e.axes.determinant() / radius.powi(3) > 0.0 || radius != 1.0);
-                    assert!(k >= report.splash || e.axes == Mat3::from_diagonal(Vec3::splat(radius)));
+    // Of each fit the longest and shortest semi-axis, and the largest ratio.
+    let fits = [(Fit::InPlace, 2.0001, 0.9999, 1.6668), (Fit::YuTurk, 1.2001, 0.0124, 4.001)];
+    for (ellipsoids, longest, shortest, ratio) in fits {
+        for radius in [1.0, 1e-12, 1e12] {
+            for threshold in [0.0, 0.48, f32::INFINITY] {
+                for support in [None, Some(2.0 * radius), Some(6.5 * radius)] {
+                    let options = Options { splash_threshold: threshold, support, ellipsoids, ..Options::default() };
+                    for (name, cloud) in &clouds {
+                        let cloud: Vec<_> = cloud.iter().map(|p| p * radius).collect();
+                        let name = format!("{name}, {ellipsoids:?}, {support:?}");
+                        let (particles, report) = prepare(&input(&cloud, radius), &options).unwrap();
+                        assert_eq!(particles.ellipsoids.len(), cloud.len(), "{name}: no hole");
+                        assert_eq!(report.splash + report.body, cloud.len());
+                        assert_eq!(particles.splash_count, report.splash);
+                        for (k, e) in particles.ellipsoids.iter().enumerate() {
+                            assert!(e.center.is_finite() && e.axes.is_finite(), "{name}: {e:?}");
+                            let lengths = e.axes.to_cols_array_2d().map(|a| Vec3::from(a).length() / radius);
+                            let (long, short) = (lengths[0].max(lengths[1]), lengths[2]);
+                            assert!(long < longest && short > shortest && long < ratio * short, "{name}: {e:?}");
+                            assert!(e.axes.determinant() / radius.powi(3) > 0.0 || radius != 1.0);
+                            assert!(k >= report.splash || e.axes == Mat3::from_diagonal(Vec3::splat(radius)));
+                        }
+                    }
                 }
             }
         }
@@ -139,7 +150,7 @@ fn awkward_clouds_give_no_nan_hole_or_needle() {
 
 #[test]
 fn guards_are_counted() {
-    let body = Options { splash_threshold: 0.0, ..Options::default() };
+    let body = yu_turk().splash_threshold(0.0);
     let count = |cloud: &[Vec3]| prepare(&input(cloud, 1.0), &body).unwrap().1;
     // 26 particles have 25 neighbours each: one too few.
     assert_eq!(count(&vec![Vec3::ONE; 26]).few_neighbours, 26);
@@ -149,4 +160,18 @@ fn guards_are_counted() {
     let report = count(&line);
     assert!(report.clamped_ratio == 200 && report.degenerate == 0, "{report:?}");
     assert!((100..200).contains(&report.clamped_long), "{report:?}");
+}
+
+#[test]
+fn in_place_cuts_are_counted() {
+    let count = |cloud: &[Vec3], options: &Options| prepare(&input(cloud, 1.0), options).unwrap().1;
+    let body = Options::default().splash_threshold(0.0);
+    // What lies on one spot spreads alike along all axes; a row is thin and long, a block's inside is neither.
+    assert_eq!(count(&[Vec3::ONE; 40], &body), Report { body: 40, ..Report::default() });
+    let row = block([0; 3], [0, 0, 19]);
+    assert_eq!(count(&row, &body), Report { body: 20, clamped_ratio: 20, clamped_long: 20, ..Report::default() });
+    let sheet = block([0; 3], [0, 9, 9]);
+    assert_eq!(count(&sheet, &body), Report { body: 100, clamped_ratio: 100, clamped_long: 100, ..Report::default() });
+    let inside = count(&block([0; 3], [9; 3]), &body);
+    assert!(inside.clamped_ratio <= 1000 - 512 && inside.degenerate + inside.few_neighbours == 0, "{inside:?}");
 }
