@@ -150,7 +150,7 @@ fn run(gpu: &Gpu, kind: &Kind) -> Endured {
     let grey = Equirect::new(2, 1, &[[0.5; 3]; 2]).expect("a map");
     let mut session = Session::new(gpu, SIZE, &grey).expect("session");
     let settings = settings(kind);
-    session.renderer.inspect(Inspection { walks: kind.debug, neighbours: 0 });
+    session.renderer.inspect(Inspection { walks: kind.debug, ..Inspection::default() });
     let input = prepare::Input { positions: &positions, radius, classes: None, ellipsoids: None };
     session.renderer.set_particles(&prepare::prepare(&input, &Default::default()).expect("prepared").0).expect("given");
     let upload = Upload::new(gpu, bytemuck::cast_slice(&positions)).expect("upload");

@@ -6,7 +6,7 @@
 //
 // name          unit                 range     published default
 // sigma_space   pixels, or radii     > 0       not printed; Truong18's comparison: reach / 3, the reach 0.5 r projected
-//               (PROJECTED)
+//               (PROJECTED)                    (0.37 r as it runs: its program takes tan(45/2) in radians)
 // sigma_depth   radii                > 0       not printed; Truong18's comparison: 10 / 3
 // REACH         pixels               0 to 27   not printed; window = 2 REACH + 1
 // iterations                                   not printed by Imai16; Truong18's comparison: 3

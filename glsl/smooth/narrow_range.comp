@@ -12,12 +12,13 @@
 // name          unit                 range     published default
 // threshold     radii                > 0       10 (10.5 in the authors' own program)
 // clamp         radii                >= 0      1 (mu = r)
-// kernel        radii, projected     >= 0      0.5 (the authors' own program: filter size 5, by 0.1)
+// kernel        radii, projected     >= 0      not printed; 0.5 (the authors' demo program: filter size 5, by 0.1)
 // REACH         pixels               0 to 100  100 (the authors' own program)
-// FIXED         -                              false; true, with REACH 4, for the clean-up that follows the two 1D passes
+// FIXED         -                              false; true, with REACH 4, for the clean-up
 // EMPTY_FAR     -                              true: no surface is too far, as every depth beyond high. Our default is
 //                                              false: it counts for nothing
-// iterations                                   3 (the authors' own program): rows, columns, clean-up; or FULL alone
+// iterations                                   3 (the authors' own program): N - 1 times rows and columns, then one clean-up;
+//                                              or N times FULL
 //
 // Counters: COUNTERS + 0: pixels whose kernel was clipped to REACH; none if FIXED.
 #version 460
