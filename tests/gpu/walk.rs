@@ -115,8 +115,8 @@ fn at_least(what: &str, driver: &Driver, pairs: &[&Pair], share: f64, good: impl
 }
 
 /// How often GPU and twin have to agree where a walk ends in one way: of the pixels of which either says so, that both do; of
-/// those of which the GPU does, on the pattern, the final direction (0.2 degrees) and the length (1 %, or some radii); and of
-/// those with the twin's direction, on the colour.
+/// those of which the GPU does, on the pattern and the length (1 %, or some radii), and where both do, on the final direction
+/// (0.2 degrees); and of those with the twin's direction, on the colour.
 struct Agreement {
     outcome: u32,
     both: f64,
@@ -173,7 +173,8 @@ fn compare_outcomes(driver: &Driver, pairs: &[Pair], outcomes: &[u32]) {
         let all: Vec<_> = pairs.iter().filter(|p| p.outcome == a.outcome).collect();
         assert!(all.len() >= 100, "{}: {what}: only {} pixels", driver.name, all.len());
         at_least(&format!("{what}: pattern"), driver, &all, a.pattern, |p| p.pattern == p.twin.pattern);
-        at_least(&format!("{what}: direction"), driver, &all, a.direction, |p| p.angle <= 0.2);
+        let both: Vec<_> = all.iter().copied().filter(|p| gpu(p) == p.twin.outcome).collect();
+        at_least(&format!("{what}: direction"), driver, &both, a.direction, |p| p.angle <= 0.2);
         let (share, radii) = a.length;
         at_least(&format!("{what}: length"), driver, &all, share, |p| {
             p.length_off() <= radii.max(0.01 * p.twin.length)
