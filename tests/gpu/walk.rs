@@ -115,8 +115,8 @@ fn at_least(what: &str, driver: &Driver, pairs: &[&Pair], share: f64, good: impl
 }
 
 /// How often GPU and twin have to agree where a walk ends in one way: of the pixels of which either says so, that both do; of
-/// those of which the GPU does, on the pattern and the length (1 %, or some radii), and where both do, on the final direction
-/// (0.2 degrees); and of those with the twin's direction, on the colour.
+/// those of which the GPU does, on the pattern, the final direction (0.2 degrees) and the length (1 %, or some radii); and of
+/// those with the twin's direction, on the colour.
 struct Agreement {
     outcome: u32,
     both: f64,
@@ -148,9 +148,9 @@ const AGREEMENTS: [Agreement; 5] = [
         length: (0.95, 0.0),
         color: 0.99,
     },
-    // On the opposite map both ask whether the wall is there, and mostly where a pixel's own depth stands for the wall: the
-    // hit moves by up to a pixel with the last step, and what is bent there by as much as that wall is steep. So direction
-    // says little, and hit, pattern and length have to do.
+    // A wall that runs along the view rays is steep in the opposite map, and its normal another one from pixel to pixel: of the
+    // pixels where both hit it there, a random cloud's agree on 27 % of the directions and on 77 % of the lengths, those of a
+    // dam break on 69 % and 96 %.
     Agreement {
         outcome: OUTCOME_OPPOSITE_WALL,
         both: 0.85,
@@ -173,8 +173,7 @@ fn compare_outcomes(driver: &Driver, pairs: &[Pair], outcomes: &[u32]) {
         let all: Vec<_> = pairs.iter().filter(|p| p.outcome == a.outcome).collect();
         assert!(all.len() >= 100, "{}: {what}: only {} pixels", driver.name, all.len());
         at_least(&format!("{what}: pattern"), driver, &all, a.pattern, |p| p.pattern == p.twin.pattern);
-        let both: Vec<_> = all.iter().copied().filter(|p| gpu(p) == p.twin.outcome).collect();
-        at_least(&format!("{what}: direction"), driver, &both, a.direction, |p| p.angle <= 0.2);
+        at_least(&format!("{what}: direction"), driver, &all, a.direction, |p| p.angle <= 0.2);
         let (share, radii) = a.length;
         at_least(&format!("{what}: length"), driver, &all, share, |p| {
             p.length_off() <= radii.max(0.01 * p.twin.length)
