@@ -159,18 +159,23 @@ fn blocks_one_before_the_other() {
     });
 }
 
-/// Depths pass through that say that the eye is in a particle.
+/// Depths pass through that say that the near plane lies in a particle: everywhere, and in the middle of the picture.
 #[test]
 fn the_eye_among_particles() {
-    let mut particles = random_cloud(9, 0.2, Vec3::splat(-1.0), Vec3::splat(1.0), 0, 120);
-    particles.ellipsoids.push(sphere(Vec3::new(0.0, 0.0, 0.9), 0.2));
-    let case = case(particles, Vec3::new(0.0, 0.0, 0.95));
-    each_driver(|driver| {
-        let shot = driver.shoot(&case);
-        let inside = shot.floats(RAW, 0).unwrap().iter().filter(|d| **d < 0.0).count();
-        assert!(inside > 100, "{}: {inside} pixels", driver.name);
-        check(driver, "eye inside", &case, 50);
-    });
+    let around = sphere(Vec3::new(0.0, 0.0, 0.9), 0.2);
+    let eye = Vec3::new(0.0, 0.0, 2.2);
+    let before = sphere(eye - Vec3::new(0.0, 0.0, 0.01), 0.003);
+    for (name, ellipsoid, eye) in [("around", around, Vec3::new(0.0, 0.0, 0.95)), ("before", before, eye)] {
+        let mut particles = random_cloud(9, 0.2, Vec3::splat(-1.0), Vec3::splat(1.0), 0, 120);
+        particles.ellipsoids.push(ellipsoid);
+        let case = case(particles, eye);
+        each_driver(|driver| {
+            let raw = driver.shoot(&case).floats(RAW, 0).unwrap();
+            let (inside, beyond) = (raw.iter().filter(|d| **d < 0.0).count(), raw.iter().filter(|d| **d > 0.0).count());
+            assert!(inside > 100 && (name == "around" || beyond > 100), "{}: {name}: {inside}, {beyond}", driver.name);
+            check(driver, &format!("a particle {name} the eye"), &case, 50);
+        });
+    }
 }
 
 /// Where nothing is a jump, the mixed derivative of curvature flow leads before the near plane at silhouettes just behind it:
