@@ -58,6 +58,6 @@ impl Filter for Bilateral {
     #[cfg(feature = "inspect")]
     fn twin(&self, _: u32, input: &super::twin::Input) -> super::twin::Smoothed {
         let (frame, depth, p) = (input.frame, input.depth, self.into());
-        super::twin::Smoothed { pixels: twin::bilateral(frame, depth, &p), counted: twin::counted(frame, depth, &p) }
+        super::twin::Smoothed::new(twin::bilateral(frame, depth, &p), twin::counted(frame, depth, &p))
     }
 }

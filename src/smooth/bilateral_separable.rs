@@ -55,6 +55,6 @@ impl Filter for BilateralSeparable {
     fn twin(&self, step: u32, input: &super::twin::Input) -> super::twin::Smoothed {
         let (frame, depth, p) = (input.frame, input.depth, self.into());
         let pixels = twin::bilateral_separable(frame, depth, &p, super::twin::Axis::of(step % 2));
-        super::twin::Smoothed { pixels, counted: super::bilateral::twin::counted(frame, depth, &p) }
+        super::twin::Smoothed::new(pixels, super::bilateral::twin::counted(frame, depth, &p))
     }
 }

@@ -49,6 +49,6 @@ impl Filter for CurvatureFlow {
         let flow = twin::flow(input.frame, input.depth, &self.into());
         let counted =
             vec![("curvature_flow_step_shortened", flow.shortened), ("curvature_flow_before_near_plane", flow.refused)];
-        super::twin::Smoothed { pixels: flow.pixel, counted }
+        super::twin::Smoothed::new(flow.pixel, counted)
     }
 }

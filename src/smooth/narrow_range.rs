@@ -119,7 +119,7 @@ impl Filter for NarrowRange {
             }
             Step::Square => twin::narrow_range(frame, depth, &p),
         };
-        super::twin::Smoothed { pixels, counted: vec![("narrow_range_kernel_clipped", clipped)] }
+        super::twin::Smoothed::new(pixels, vec![("narrow_range_kernel_clipped", clipped)])
     }
 }
 

@@ -25,6 +25,6 @@ impl Filter for Unsmoothed {
     #[cfg(feature = "inspect")]
     fn twin(&self, _: u32, input: &super::twin::Input) -> super::twin::Smoothed {
         let pixels = input.depth.iter().map(|d| super::twin::Pixel::kept(*d)).collect();
-        super::twin::Smoothed { pixels, counted: Vec::new() }
+        super::twin::Smoothed::new(pixels, Vec::new())
     }
 }

@@ -23,6 +23,15 @@ pub struct Smoothed {
     pub pixels: Vec<Pixel>,
     /// What it counts, by the counters' names: each of them.
     pub counted: Vec<(&'static str, Count)>,
+    /// What it leaves beside the depths for the next step; empty if nothing.
+    pub beside: Vec<Pixel>,
+}
+
+impl Smoothed {
+    /// Nothing but depths, and what is counted.
+    pub(crate) fn new(pixels: Vec<Pixel>, counted: Vec<(&'static str, Count)>) -> Smoothed {
+        Smoothed { pixels, counted, beside: Vec::new() }
+    }
 }
 
 /// At how many pixels a guard fires.

@@ -70,6 +70,12 @@ fn compare(label: &str, filter: &Smooth, shot: &Shot, step: u32, side: u32) -> (
         assert!(depth[i] > 0.0 || found[i].to_bits() == depth[i].to_bits(), "{}: nothing to smooth", at());
         changed += usize::from(found[i] != depth[i]);
     }
+    if !want.beside.is_empty() {
+        let name = filter.beside(step + 1).expect("what the next step reads");
+        for (i, (pixel, found)) in want.beside.iter().zip(shot.floats(name, side).expect(name)).enumerate() {
+            assert!(pixel.admits(found), "{label}, step {step}, side {side}, {name} at {i}: {found}, not {pixel:?}");
+        }
+    }
     (changed, want.counted)
 }
 

@@ -215,5 +215,5 @@ pub(super) fn smoothed(p: &PlaneFit, input: &Input) -> Smoothed {
         ("plane_fit_update_too_long", count(Outcome::Unbounded)),
         ("plane_fit_window_clipped", clipped),
     ];
-    Smoothed { pixels, counted }
+    Smoothed::new(pixels, counted)
 }
