@@ -44,6 +44,7 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
         plan.work_for(Home::View, "layers");
         let layered = method.layers.member().record(&mut plan, scene, &drawn);
         plan.work_for(Home::View, "smooth");
+        plan.smoothing_steps = scene.smoothing_steps;
         surfaces.body = layered.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
         (surfaces.splash, surfaces.thickness, surfaces.speed) = (layered.splash, layered.thickness, layered.speed);
         plan.work_at(Scale::Full);
@@ -81,6 +82,8 @@ pub(crate) struct Scene<'a> {
     pub eye: Mat4,
     /// Whether what each walk met is written too.
     pub walks: bool,
+    /// Of smoothing only so many steps, if it has more.
+    pub smoothing_steps: Option<u32>,
     /// Whether the device has points larger than a pixel.
     pub points: bool,
     /// Largest storage buffer in bytes.
@@ -117,6 +120,7 @@ impl<'a> Scene<'a> {
             output: vk::Format::R32G32B32A32_SFLOAT,
             eye: Mat4::IDENTITY,
             walks: false,
+            smoothing_steps: None,
             points: limits.point_size > 1.0,
             storage_size: limits.storage_size,
         }

@@ -33,11 +33,15 @@ pub struct Inspection {
     /// Where positions are prepared on the device, so many neighbours of every particle, into "neighbours (debug)": for
     /// each its index, how many there are, and the indices of the first of them; 0 lists none.
     pub neighbours: u32,
+    /// Smoothing ends after so many times that depths go through a shader, if it does not end before: of a filter's maps only
+    /// the last two are still there after a frame.
+    pub smoothing_steps: Option<u32>,
 }
 
 impl Inspection {
     pub(crate) fn apply(&self, scene: &mut Scene) {
         scene.walks = self.walks;
+        scene.smoothing_steps = self.smoothing_steps;
         if let Some(p) = &mut scene.prepare {
             p.neighbours = self.neighbours;
         }
@@ -114,6 +118,13 @@ impl Renderer {
     pub fn counters(&self) -> [(&'static str, Vec<&'static str>); 2] {
         let [particles, view] = self.counters.clone();
         [(COUNTERS[0], particles), (COUNTERS[1], view)]
+    }
+
+    /// The block of the frame last recorded into this slot, as shaders read it and completed it. What they wrote is to be
+    /// visible to the host.
+    pub fn block(&mut self, slot: usize) -> Option<Frame> {
+        let bytes = self.slots.get_mut(slot)?.frame_block.mapped().get(..size_of::<Frame>())?;
+        Some(bytemuck::pod_read_unaligned(bytes))
     }
 
     /// Names of the targets and buffers of the last frame.

@@ -38,7 +38,7 @@ pub struct Renderer {
     pub(crate) pipelines: Pipelines,
     /// Of the particles, and of the view.
     pub(crate) tables: [Table; 2],
-    slots: Vec<Slot>,
+    pub(crate) slots: Vec<Slot>,
     retired: Retired,
     frame: u64,
     /// Centres, and the two halves of the shapes.

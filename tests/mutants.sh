@@ -30,24 +30,32 @@ if [ ! -e target/mutants ] && [ -d target/debug/deps ]; then
 fi
 
 run() { # tests of one binary, in the copy
-  (cd "$copy" && timeout 900 cargo test --quiet --test "$1" -- --exact "${@:2}" > mutant.log 2>&1)
+  local binary=(--test "$1")
+  [ "$1" != lib ] || binary=(--lib)
+  (cd "$copy" && timeout 900 cargo test --quiet "${binary[@]}" -- --exact "${@:2}" > mutant.log 2>&1)
 }
-in_gpu=() in_endurance=()
-for line in "${lines[@]}"; do
-  test=${line##* ::: }
-  if [[ $test == endurance::* ]]; then in_endurance+=("${test#endurance::}"); else in_gpu+=("$test"); fi
-done
+place() { # binary and name of a test
+  case $1 in
+    endurance::* | cpu::* | cli::* | lib::*) binary=${1%%::*} name=${1#*::} ;;
+    *) binary=gpu name=$1 ;;
+  esac
+}
 # Without a mistake they pass, or their failing would say nothing.
-[ ${#in_gpu[@]} = 0 ] || run gpu "${in_gpu[@]}" || { tail -40 "$copy/mutant.log"; exit 1; }
-[ ${#in_endurance[@]} = 0 ] || run endurance "${in_endurance[@]}" || { tail -40 "$copy/mutant.log"; exit 1; }
+for each in gpu endurance cpu cli lib; do
+  sound=()
+  for line in "${lines[@]}"; do
+    place "${line##* ::: }"
+    [ "$binary" != $each ] || sound+=("$name")
+  done
+  [ ${#sound[@]} = 0 ] || run $each "${sound[@]}" || { tail -40 "$copy/mutant.log"; exit 1; }
+done
 
 survived=0
 for line in "${lines[@]}"; do
   IFS=$'\t' read -r file from to test <<< "${line// ::: /$'\t'}"
   FROM=$from TO=$to perl -0pi -e 'my $n = s/\Q$ENV{FROM}\E/$ENV{TO}/g; die "$ARGV: found $n times: $ENV{FROM}\n" if $n != 1' "$copy/$file"
-  binary=gpu
-  [[ $test == endurance::* ]] && binary=endurance
-  if run "$binary" "${test#endurance::}"; then
+  place "$test"
+  if run "$binary" "$name"; then
     echo "SURVIVED  $file: $from -> $to ($test)"
     survived=$((survived + 1))
   elif grep -q "could not compile\|custom build command" "$copy/mutant.log"; then

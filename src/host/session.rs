@@ -1,7 +1,7 @@
 //! One renderer on one device: frames in, targets out.
 
 use super::{Canvas, Gpu, HostError};
-use crate::{Equirect, FrameInput, Renderer, inspect::Spec, profile::FrameTimes};
+use crate::{Equirect, FrameInput, Renderer, inspect::Spec, profile::FrameTimes, shader::Frame};
 use ash::vk;
 
 /// Output format: linear float, so that one frame serves pictures, dumps and downsampling.
@@ -89,6 +89,23 @@ impl<'a> Session<'a> {
         let data =
             self.gpu.read_back(bytes, |cmd, to| Ok(unsafe { renderer.record_copy(cmd, name, layer, to, 0) }?))?;
         Ok(Some(data.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect()))
+    }
+
+    /// The block that the last frame's shaders read, completed by them where the device finds the particles' box.
+    pub fn block(&mut self) -> Result<Frame, HostError> {
+        self.gpu.run(|cmd| {
+            let visible = [vk::MemoryBarrier2::default()
+                .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+                .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+                .dst_stage_mask(vk::PipelineStageFlags2::HOST)
+                .dst_access_mask(vk::AccessFlags2::HOST_READ)];
+            // SAFETY: `cmd` is recording.
+            unsafe {
+                self.gpu.device.cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default().memory_barriers(&visible));
+            }
+            Ok(())
+        })?;
+        self.renderer.block(0).ok_or(crate::Error::Order("no frame in flight has a block").into())
     }
 
     /// What the last frame counted, by name.

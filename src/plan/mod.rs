@@ -73,6 +73,8 @@ pub(crate) struct Plan {
     pub steps: Vec<Step>,
     /// Names of the counters of each home.
     pub counters: [Vec<&'static str>; 2],
+    /// Smoothing takes no more steps than so many.
+    pub smoothing_steps: Option<u32>,
     /// Where the surfaces are that light meets.
     #[cfg(feature = "inspect")]
     pub surfaces: crate::inspect::SurfaceNames,
@@ -91,6 +93,7 @@ impl Plan {
             resources: Vec::new(),
             steps: Vec::new(),
             counters: Default::default(),
+            smoothing_steps: None,
             #[cfg(feature = "inspect")]
             surfaces: Default::default(),
             home: Home::Particles,

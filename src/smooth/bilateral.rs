@@ -73,7 +73,8 @@ impl Filter for Bilateral {
     }
 
     #[cfg(feature = "inspect")]
-    fn twin(&self, _: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
-        twin::bilateral(input.frame, input.depth, &self.into())
+    fn twin(&self, _: u32, input: &super::twin::Input) -> super::twin::Smoothed {
+        let (frame, depth, p) = (input.frame, input.depth, self.into());
+        super::twin::Smoothed::new(twin::bilateral(frame, depth, &p), twin::counted(frame, depth, &p))
     }
 }

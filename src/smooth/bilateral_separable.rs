@@ -42,8 +42,9 @@ impl Filter for BilateralSeparable {
     }
 
     #[cfg(feature = "inspect")]
-    fn twin(&self, step: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
-        let axis = super::twin::Axis::of(step % 2);
-        twin::bilateral_separable(input.frame, input.depth, &self.into(), axis)
+    fn twin(&self, step: u32, input: &super::twin::Input) -> super::twin::Smoothed {
+        let (frame, depth, p) = (input.frame, input.depth, self.into());
+        let pixels = twin::bilateral_separable(frame, depth, &p, super::twin::Axis::of(step % 2));
+        super::twin::Smoothed::new(pixels, super::bilateral::twin::counted(frame, depth, &p))
     }
 }

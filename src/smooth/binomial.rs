@@ -70,12 +70,14 @@ impl Filter for Binomial {
     }
 
     #[cfg(feature = "inspect")]
-    fn twin(&self, step: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
+    fn twin(&self, step: u32, input: &super::twin::Input) -> super::twin::Smoothed {
         let mut p = twin::Parameters::from(self);
         p.silhouette_map &= step + 1 == self.steps();
-        match step % 2 {
-            0 => twin::across(input.frame, input.depth, &p).0,
-            _ => twin::down(input.frame, input.depth, input.beside, &p),
-        }
+        let (pixels, beside) = match step % 2 {
+            0 => twin::across(input.frame, input.depth, &p),
+            _ => (twin::down(input.frame, input.depth, input.beside, &p), Vec::new()),
+        };
+        let clipped = super::twin::clipped(input.frame, input.depth, p.kernel, p.reach);
+        super::twin::Smoothed { pixels, counted: vec![("binomial_kernel_clipped", clipped)], beside }
     }
 }

@@ -49,7 +49,10 @@ impl Filter for CurvatureFlow {
     }
 
     #[cfg(feature = "inspect")]
-    fn twin(&self, _: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
-        twin::curvature_flow(input.frame, input.depth, &self.into())
+    fn twin(&self, _: u32, input: &super::twin::Input) -> super::twin::Smoothed {
+        let flow = twin::flow(input.frame, input.depth, &self.into());
+        let counted =
+            vec![("curvature_flow_step_shortened", flow.shortened), ("curvature_flow_before_near_plane", flow.refused)];
+        super::twin::Smoothed::new(flow.pixel, counted)
     }
 }

@@ -55,7 +55,7 @@ pub(crate) trait Filter {
     }
     /// What one of these times, counted from 0, makes of the depths of one side: the same in 64 bits.
     #[cfg(feature = "inspect")]
-    fn twin(&self, step: u32, input: &twin::Input) -> Vec<twin::Pixel>;
+    fn twin(&self, step: u32, input: &twin::Input) -> twin::Smoothed;
 }
 
 /// Where a filter leaves a depth as it is.
@@ -86,7 +86,7 @@ impl Smooth {
     }
 
     /// The CPU twin of one of these times, counted from 0.
-    pub fn twin(&self, step: u32, input: &twin::Input) -> Vec<twin::Pixel> {
+    pub fn twin(&self, step: u32, input: &twin::Input) -> twin::Smoothed {
         self.member().twin(step, input)
     }
 }
@@ -101,6 +101,7 @@ fn edge(window: u32, times: u32, cap: Option<u32>) -> u32 {
 /// Takes the body's depths through so many steps, each from the target that the last one wrote to another; there are two
 /// of these, and the first step reads the body's own. Gives the last.
 fn alternate(plan: &mut Plan, body: &Body, steps: u32, mut step: impl FnMut(&mut Plan, u32, Target, Target)) -> Target {
+    let steps = steps.min(plan.smoothing_steps.unwrap_or(u32::MAX));
     let names = ["body depth (smoothed, odd)", "body depth (smoothed, even)"];
     let targets: Vec<_> =
         names.into_iter().take(steps as usize).map(|name| plan.map(name, Format::R32_SFLOAT, body.sides)).collect();

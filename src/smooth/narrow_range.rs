@@ -1,9 +1,11 @@
-//! The narrow-range filter (`glsl/smooth/narrow_range.comp`; Truong18): over a square window, or rows, columns and a small
-//! clean-up.
+//! The narrow-range filter (`glsl/smooth/narrow_range.comp`; Truong18): over a square window, or by rows and columns, with a
+//! small clean-up at the end.
 
 #[cfg(feature = "inspect")]
 pub mod twin;
 
+#[cfg(feature = "inspect")]
+use super::twin::Axis;
 use super::{Filter, alternate, edge, per_pixel};
 use crate::{
     layers::Body,
@@ -15,7 +17,7 @@ use crate::{
 choices! {
     /// What the window is.
     pub enum Shape {
-        /// Rows, columns, and a small square that cleans up after them.
+        /// Rows and columns in turn, and in place of the last iteration a small square that cleans up after them.
         #[default]
         Separable = "separable",
         /// The whole square.
@@ -27,11 +29,12 @@ choices! {
 const WIDEST: u32 = 201;
 
 parameters! {
-    /// The narrow-range filter (Truong18); what the paper leaves open is as in its authors' own program.
+    /// The narrow-range filter (Truong18). Where the paper leaves something open, the schedule and the kernel (5 times 0.1 r)
+    /// are those of its authors' demo program; that no surface counts for nothing is our choice.
     pub struct NarrowRange {
         /// What the window is
-        shape: Shape = Shape::Separable, "", "separable (rows, columns, clean-up) or square" => |_| true;
-        /// Pixels to either side; the authors' program has a filter size of 5, by 0.1
+        shape: Shape = Shape::Separable, "", "separable (rows and columns, at last a clean-up) or square" => |_| true;
+        /// Pixels to either side; the authors' demo program has a filter size of 5, by 0.1
         kernel: f32 = 0.5, "projected particle radii", "a finite value of at least 0"
             => |k| k.is_finite() && *k >= 0.0;
         /// Largest edge of the window
@@ -41,9 +44,9 @@ parameters! {
         threshold: f32 = 10.0, "particle radii", "a finite value above 0" => |t| t.is_finite() && *t > 0.0;
         /// How far behind the pixel what is too far counts (Truong18: mu = r)
         clamp: f32 = 1.0, "particle radii", "a finite value of at least 0" => |c| c.is_finite() && *c >= 0.0;
-        /// Whether no surface counts as too far (so Truong18), or not at all (ours)
+        /// Whether no surface counts as too far (so Truong18), or not at all (ours: silhouettes are not pulled back)
         empty_far: bool = false, "", "true or false" => |_| true;
-        /// How often it is applied
+        /// How often it is applied; if separable, the clean-up is the last one
         iterations: u32 = 3, "", "0 to 20" => |n| *n <= 20;
     }
 }
@@ -51,23 +54,41 @@ parameters! {
 /// Pixels to either side of the clean-up.
 const CLEAN_UP: u32 = 4;
 
+/// What one of the times does that depths go through a shader.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Step {
+    Rows,
+    Columns,
+    CleanUp,
+    Square,
+}
+
 impl NarrowRange {
-    /// Times that depths go through a shader in one iteration: rows, columns, clean-up; or the square.
-    fn steps_each(&self) -> u32 {
-        if self.shape == Shape::Separable { 3 } else { 1 }
+    /// One after the other: iterations but the last are rows and columns, the last is the clean-up.
+    fn schedule(&self) -> Vec<Step> {
+        let iterations = self.iterations as usize;
+        match self.shape {
+            Shape::Square => vec![Step::Square; iterations],
+            Shape::Separable if iterations == 0 => Vec::new(),
+            Shape::Separable => {
+                let mut steps = [Step::Rows, Step::Columns].repeat(iterations - 1);
+                steps.push(Step::CleanUp);
+                steps
+            }
+        }
     }
 }
 
 impl Filter for NarrowRange {
     fn record(&self, plan: &mut Plan, body: &Body) -> Target {
-        let each = self.steps_each();
-        alternate(plan, body, each * self.iterations, |plan, step, from, to| {
-            let phase = step % each;
-            let clean_up = phase == 2;
-            let call = if each == 3 && !clean_up {
-                Call::compute(&NARROW_RANGE_ALONG_COMP).constant("AXIS", phase)
-            } else {
-                Call::compute(&NARROW_RANGE_FULL_COMP)
+        let schedule = self.schedule();
+        alternate(plan, body, schedule.len() as u32, |plan, i, from, to| {
+            let step = schedule[i as usize];
+            let clean_up = step == Step::CleanUp;
+            let call = match step {
+                Step::Rows => Call::compute(&NARROW_RANGE_ALONG_COMP).constant("AXIS", 0u32),
+                Step::Columns => Call::compute(&NARROW_RANGE_ALONG_COMP).constant("AXIS", 1u32),
+                Step::CleanUp | Step::Square => Call::compute(&NARROW_RANGE_FULL_COMP),
             };
             let call = call
                 .read("depth_in", from)
@@ -86,16 +107,37 @@ impl Filter for NarrowRange {
 
     #[cfg(feature = "inspect")]
     fn steps(&self) -> u32 {
-        self.steps_each() * self.iterations
+        self.schedule().len() as u32
     }
 
     #[cfg(feature = "inspect")]
-    fn twin(&self, step: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
-        let p = twin::Parameters::from(self);
-        match (self.steps_each(), step % 3) {
-            (3, 2) => twin::narrow_range(input.frame, input.depth, &p.clean_up()),
-            (3, axis) => twin::narrow_range_along(input.frame, input.depth, &p, super::twin::Axis::of(axis)),
-            _ => twin::narrow_range(input.frame, input.depth, &p),
-        }
+    fn twin(&self, step: u32, input: &super::twin::Input) -> super::twin::Smoothed {
+        let (frame, depth, p) = (input.frame, input.depth, twin::Parameters::from(self));
+        let mut clipped = super::twin::clipped(frame, depth, p.kernel, p.reach);
+        let pixels = match self.schedule()[step as usize] {
+            Step::Rows => twin::narrow_range_along(frame, depth, &p, Axis::X),
+            Step::Columns => twin::narrow_range_along(frame, depth, &p, Axis::Y),
+            Step::CleanUp => {
+                clipped = super::twin::Count::default();
+                twin::narrow_range(frame, depth, &p.clean_up())
+            }
+            Step::Square => twin::narrow_range(frame, depth, &p),
+        };
+        super::twin::Smoothed::new(pixels, vec![("narrow_range_kernel_clipped", clipped)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{NarrowRange, Shape, Step::*};
+
+    /// As the authors' program: rows and columns for all iterations but the last, which is the clean-up.
+    #[test]
+    fn the_clean_up_is_the_last_iteration() {
+        let steps = |shape, n| NarrowRange::default().shape(shape).iterations(n).schedule();
+        assert!(steps(Shape::Separable, 3) == [Rows, Columns, Rows, Columns, CleanUp]);
+        assert!(steps(Shape::Separable, 1) == [CleanUp]);
+        assert!(steps(Shape::Separable, 0).is_empty());
+        assert!(steps(Shape::Square, 2) == [Square, Square]);
     }
 }

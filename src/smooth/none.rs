@@ -23,7 +23,8 @@ impl Filter for Unsmoothed {
     }
 
     #[cfg(feature = "inspect")]
-    fn twin(&self, _: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
-        input.depth.iter().map(|d| super::twin::Pixel::kept(*d)).collect()
+    fn twin(&self, _: u32, input: &super::twin::Input) -> super::twin::Smoothed {
+        let pixels = input.depth.iter().map(|d| super::twin::Pixel::kept(*d)).collect();
+        super::twin::Smoothed::new(pixels, Vec::new())
     }
 }

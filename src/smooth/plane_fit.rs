@@ -101,7 +101,7 @@ impl Filter for PlaneFit {
     }
 
     #[cfg(feature = "inspect")]
-    fn twin(&self, _: u32, input: &super::twin::Input) -> Vec<super::twin::Pixel> {
-        twin::pixels(self, input)
+    fn twin(&self, _: u32, input: &super::twin::Input) -> super::twin::Smoothed {
+        twin::smoothed(self, input)
     }
 }

@@ -16,6 +16,41 @@ pub struct Input<'a> {
     pub beside: &'a [f32],
 }
 
+/// What one step of a filter makes of one side of the body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Smoothed {
+    /// Depths.
+    pub pixels: Vec<Pixel>,
+    /// What it counts, by the counters' names: each of them.
+    pub counted: Vec<(&'static str, Count)>,
+    /// What it leaves beside the depths for the next step; empty if nothing.
+    pub beside: Vec<Pixel>,
+}
+
+impl Smoothed {
+    /// Nothing but depths, and what is counted.
+    pub(crate) fn new(pixels: Vec<Pixel>, counted: Vec<(&'static str, Count)>) -> Smoothed {
+        Smoothed { pixels, counted, beside: Vec::new() }
+    }
+}
+
+/// At how many pixels a guard fires.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Count {
+    /// At least.
+    pub least: u32,
+    /// At most, where rounding decides.
+    pub most: u32,
+}
+
+impl Count {
+    /// One pixel more, at which it fires, or may fire.
+    pub fn add(&mut self, fires: bool, close: bool) {
+        self.least += u32::from(fires && !close);
+        self.most += u32::from(fires || close);
+    }
+}
+
 /// One pixel after a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pixel {
@@ -127,6 +162,17 @@ pub fn reach(wanted: f64, most: u32) -> (i32, Option<i32>) {
     let slack = 4.0 * f64::from(f32::EPSILON) * wanted;
     let (low, own, high) = (whole(wanted - slack), whole(wanted), whole(wanted + slack));
     (own, [low, high].into_iter().find(|r| *r != own))
+}
+
+/// Pixels with a surface at which a kernel of this length needs more than `most` pixels to either side; see [`reach`].
+pub fn clipped(frame: &Frame, depth: &[f32], length: f32, most: u32) -> Count {
+    let mut count = Count::default();
+    for own in depth.iter().filter(|d| **d > 0.0) {
+        let wanted = projected(frame, length, f64::from(*own));
+        let beyond = wanted - f64::from(most);
+        count.add(beyond > 0.0, beyond.abs() <= 4.0 * f64::from(f32::EPSILON) * wanted);
+    }
+    count
 }
 
 /// A weighted average of rises above a pixel's own depth, and what 32 bits do to it.

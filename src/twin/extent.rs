@@ -1,7 +1,7 @@
 //! Twin of `glsl/extent.comp`: the box of all positions and the cells it occupies.
 
 use crate::{shader::FURTHEST_CELL, space::power_of_two};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// What the extent pass finds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +49,16 @@ pub fn kept(positions: &[Vec3], radius: f32) -> Kept {
     let middle = scaled().nth(positions.len() / 2).filter(|p| p.is_finite());
     kept.origin = middle.unwrap_or(0.5 * (low * scale) + 0.5 * (high * scale)).to_array();
     kept
+}
+
+/// The box around everything that may be drawn of finite positions, in the liquid's own space: `longest` is the longest
+/// semi-axis there may be, in radii.
+pub fn drawn(positions: &[Vec3], radius: f32, longest: f32) -> (DVec3, DVec3) {
+    let (low, high) = extent(positions, radius, 0).bounds;
+    let origin = Vec3::from(kept(positions, radius).origin).as_dvec3() / f64::from(power_of_two(radius));
+    let room = f64::from(longest.max(1.0));
+    let own = |x: Vec3| (x.as_dvec3() - origin) / f64::from(radius);
+    (own(low) - room, own(high) + room)
 }
 
 /// floor(x / edge) of a finite coordinate.

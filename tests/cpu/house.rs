@@ -88,13 +88,24 @@ fn planted_mistakes_can_be_planted() {
         };
         let code = fs::read_to_string(root().join(file)).expect("a file of the repository");
         assert_eq!(code.matches(text).count(), 1, "{file}: {text}");
-        let (module, name) = test.split_once("::").expect("module::test");
-        let tests = match module {
-            "endurance" => "tests/endurance.rs".into(),
-            module => format!("tests/gpu/{module}.rs"),
+        let (module, name) = test.rsplit_once("::").expect("module::test");
+        let folder = match module.split("::").next() {
+            Some("cpu" | "cli" | "endurance") => "tests",
+            Some("lib") => "src",
+            _ => "tests/gpu",
         };
-        let tests = fs::read_to_string(root().join(tests)).expect("a module of tests");
-        assert!(tests.contains(&format!("fn {name}(")), "there is no test {test}");
+        let module = module.trim_start_matches("lib::").replace("::", "/");
+        // Unit tests may be a module within the file of what they test.
+        let within = module.strip_suffix("/tests").unwrap_or(&module);
+        let files =
+            [format!("{module}.rs"), format!("{module}/mod.rs"), format!("{within}.rs"), format!("{within}/mod.rs")];
+        let is_test = |file: &String| {
+            let tests = fs::read_to_string(root().join(folder).join(file)).unwrap_or_default();
+            // Attributes stand before it without an empty line between.
+            let before = tests.split_once(&format!("fn {name}()")).map(|(before, _)| before);
+            before.and_then(|b| b.rsplit("\n\n").next()).is_some_and(|b| b.contains("#[test]"))
+        };
+        assert!(files.iter().any(is_test), "there is no test {test}");
         found += 1;
     }
     assert!(found > 50, "only {found}");

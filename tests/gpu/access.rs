@@ -1,11 +1,14 @@
 //! Barriers: what the passes declare becomes what they need, and validation would say so if it did not.
 
-use crate::support::{Choose, camera, each_driver, random_cloud};
+use crate::{
+    drivers::SKY,
+    support::{Choose, camera, each_driver, random_cloud},
+};
 use ash::vk::{self, AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};
 use glam::Vec3;
 use meniscus::host::{Gpu, HostError, Instance, Session};
 use meniscus::inspect::{Access, State};
-use meniscus::{Equirect, FrameInput, Settings};
+use meniscus::{FrameInput, Settings};
 
 /// Every target that a pass reads: the pass, the target, the stage that wrote it, the stage that reads it. Of several
 /// passes that read in the same stage only the first needs a barrier.
@@ -33,7 +36,7 @@ fn a_frame_has_a_barrier_before_every_read() {
     each_driver(|driver| {
         let instance = Instance::new(true).expect("validation layer: run ./setup.sh");
         let gpu = Gpu::new(&instance, instance.pick(Some(&driver.name)).expect("device")).expect("device");
-        let mut session = Session::new(&gpu, size, &Equirect::procedural_sky()).expect("session");
+        let mut session = Session::new(&gpu, size, &SKY).expect("session");
         let particles = random_cloud(7, 0.05, Vec3::splat(-0.5), Vec3::splat(0.5), 40, 400);
         session.renderer.set_particles(&particles).expect("particles");
         let camera = camera(Vec3::new(0.3, 0.4, 2.0), Vec3::ZERO, size);

@@ -3,6 +3,7 @@
 
 use crate::{
     analytic::{Quadric, SIZE, case, pixels, settings, snell, view, within},
+    drivers::SKY,
     host::{self, with_renderer},
     support::{Choose, Driver, each_driver, random_cloud, sphere},
     walk::degrees,
@@ -10,7 +11,7 @@ use crate::{
 use ash::vk;
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{
-    Background, Camera, Ellipsoid, EnvironmentInput, EnvironmentShape, Equirect, FrameInput, SceneInput, Settings,
+    Background, Camera, Ellipsoid, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput, Settings,
     host::{Canvas, Gpu},
     shader::{OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_SCENE, WETTING_GAP},
     twin::{background::env_color, optics::fresnel},
@@ -83,7 +84,7 @@ fn a_plane_in_and_behind_a_slab_is_met_where_the_closed_form_says() {
     let q = Quadric::new(&body);
     let camera = view(Vec3::new(0.0, 0.0, 2.5), Vec3::ZERO, 20.0);
     let absorption = Vec3::new(1.0, 0.5, 2.0);
-    let sky = Equirect::procedural_sky();
+    let sky = &*SKY;
     for (refractions, plane) in [(1, 0.0), (4, 0.0), (2, 0.7), (2, -0.2), (4, -1.0), (1, -1.0)] {
         let settings = settings(refractions, 0).absorption(absorption);
         let case = case(RADIUS, &[], &[body], camera, settings);
@@ -131,7 +132,7 @@ fn a_plane_in_and_behind_a_slab_is_met_where_the_closed_form_says() {
                 }
                 // The host's colours lie on its pixels, half a pixel off at most.
                 let light = fresnel(-p.dir.dot(n) as f32, -bent.dot(n) as f32, IOR as f32, false);
-                let mirror = light * env_color(&sky, mirrored);
+                let mirror = light * env_color(sky, mirrored);
                 let mut reflected_far = Vec3::ZERO;
                 let brought = if refractions == 1 {
                     seen_at(&camera, x + to_plane * bent - p.eye)
@@ -148,7 +149,7 @@ fn a_plane_in_and_behind_a_slab_is_met_where_the_closed_form_says() {
                     let y = x + far * bent;
                     let absorbed = (-absorption * far as f32).exp();
                     reflected_far =
-                        (1.0 - light) * lost * absorbed * env_color(&sky, bent - 2.0 * bent.dot(wall) * wall);
+                        (1.0 - light) * lost * absorbed * env_color(sky, bent - 2.0 * bent.dot(wall) * wall);
                     (1.0 - lost) * absorbed * seen_at(&camera, y + hit(y, out) * out - p.eye)
                 };
                 let want = mirror + reflected_far + (1.0 - light) * brought;

@@ -3,11 +3,12 @@
 use crate::support::{Cloud, each_driver};
 use glam::Vec3;
 use meniscus::{
-    prepare::{Fit, Search},
+    prepare::{Fit, Options, Search},
     shader::{
-        EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_LEAST, EXTENT_MOST, EXTENT_ORIGIN, EXTENT_PASSES,
+        ELLIPSOID_WIDE, EXTENT_BITS, EXTENT_FIRST_CELL, EXTENT_LAST_CELL, EXTENT_LEAST, EXTENT_MOST, EXTENT_ORIGIN,
+        EXTENT_PASSES,
     },
-    twin::extent::{Kept, extent, kept},
+    twin::extent::{Kept, drawn, extent, kept},
 };
 
 #[test]
@@ -38,6 +39,17 @@ fn boxes_cells_and_bits_are_the_twins() {
                     assert_eq!(three(EXTENT_BITS), want.bits, "{label}");
                     assert_eq!(words[EXTENT_PASSES as usize], want.bits.iter().sum::<u32>().div_ceil(5), "{label}");
                     assert_eq!(shot.counter("not_finite"), want.lost, "{label}");
+                    // Differences, products with 1 / r (3 ulp), and sums.
+                    let longest = match ellipsoids {
+                        Fit::YuTurk => Options::default().max_semi_axis,
+                        _ => ELLIPSOID_WIDE,
+                    };
+                    let drawn = drawn(&positions, radius, longest);
+                    for (found, want) in [(shot.block.bounds_min, drawn.0), (shot.block.bounds_max, drawn.1)] {
+                        let off = (found.as_dvec3() - want).abs();
+                        let slack = 5.0 * f64::from(f32::EPSILON) * (want.abs() + 2.4);
+                        assert!(off.cmple(slack).all(), "{label}: box at {found}, not {want}");
+                    }
                 }
             }
         }

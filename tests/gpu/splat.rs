@@ -2,11 +2,12 @@
 
 use crate::{
     cull::{around_the_near_plane, both, drawn_as_quads, point_size},
+    drivers::SKY,
     support::{Case, Choose, Driver, Random, Shot, camera, each_driver, random_cloud, sphere},
 };
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{
-    Camera, Ellipsoid, Equirect, Particles, Settings,
+    Camera, Ellipsoid, Particles, Settings,
     shader::{CLASS_BODY, CLASS_SPLASH, Particle, SIDE_BACK, SIDE_FRONT},
     space::Space,
     twin::{self, normal::decode_normal, quadric::pixel_ray},
@@ -335,7 +336,7 @@ fn a_frame_does_without_what_it_does_not_need() {
         assert!(unseen.words("splash depth", 0).unwrap().iter().all(|d| *d == 0), "{}", driver.name);
         assert_eq!(empty.picture, unseen.picture, "{}", driver.name);
         // The camera looks along -z, level: what it sees straight ahead is the map's horizon there.
-        let sky = Equirect::procedural_sky();
+        let sky = &*SKY;
         let [width, height] = sky.size();
         for (i, seen) in empty.picture.iter().enumerate() {
             let v = pixel_ray(&empty.frame, i as u32 % size[0], i as u32 / size[0]).normalize();

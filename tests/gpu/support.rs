@@ -43,12 +43,14 @@ impl<'a> Cloud<'a> {
 /// What a frame left behind.
 pub struct Shot {
     pub frame: Frame,
+    /// The block that shaders read, as they left it.
+    pub block: Frame,
     /// In which its targets and its twins measure: particle radii.
     pub space: Space,
     pub size: [u32; 2],
     pub picture: Vec<[f32; 3]>,
     targets: HashMap<(&'static str, u32), Vec<u32>>,
-    counters: Vec<(&'static str, u32)>,
+    pub counters: Vec<(&'static str, u32)>,
 }
 
 impl Shot {
@@ -94,14 +96,21 @@ impl<'a> Driver<'a> {
     /// Renders a case (with `debug` targets) and reads everything back.
     pub fn shoot(&self, case: &Case) -> Shot {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
-        self.shoot_input(case, 0, &|input| input)
+        self.shoot_input(case, Inspection::default(), &|input| input)
+    }
+
+    /// The same of a frame whose smoothing ends after so many steps.
+    pub fn shoot_step(&self, case: &Case, steps: u32) -> Shot {
+        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        let inspection = Inspection { smoothing_steps: Some(steps), ..Inspection::default() };
+        self.shoot_input(case, inspection, &|input| input)
     }
 
     /// The same of particles whose speeds are known.
     pub fn shoot_moving(&self, case: &Case, speeds: &[f32]) -> Shot {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
         self.session.borrow_mut().renderer.set_speeds(speeds).expect("speeds");
-        self.shoot_input(case, 0, &|input| input)
+        self.shoot_input(case, Inspection::default(), &|input| input)
     }
 
     /// The same for positions prepared on the device, with every neighbour listed; they begin at `offset` bytes of their
@@ -128,13 +137,14 @@ impl<'a> Driver<'a> {
             .laid_out(cloud.offset as u64, cloud.stride as u64)
             .options(cloud.options)
             .keep_class_below(cloud.keep_class_below);
-        self.shoot_input(case, neighbours, &|input| input.positions(positions))
+        self.shoot_input(case, Inspection { neighbours, ..Inspection::default() }, &|input| input.positions(positions))
     }
 
     /// The same before a scene of the host's.
     pub fn shoot_before(&self, case: &Case, scene: SceneInput, background: Background) -> Shot {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
-        let mut shot = self.shoot_input(case, 0, &|input| input.scene(scene).background(background));
+        let mut shot =
+            self.shoot_input(case, Inspection::default(), &|input| input.scene(scene).background(background));
         let p = case.camera.projection;
         shot.frame.scene_z_scale = p.z_axis.z;
         shot.frame.scene_z_offset = p.w_axis.z / shot.space.radius as f32;
@@ -145,7 +155,7 @@ impl<'a> Driver<'a> {
     /// The same with another input.
     pub fn shoot_with(&self, case: &Case, change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>) -> Shot {
         self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
-        self.shoot_input(case, 0, change)
+        self.shoot_input(case, Inspection::default(), change)
     }
 
     /// The device that frames are rendered on.
@@ -156,11 +166,11 @@ impl<'a> Driver<'a> {
     fn shoot_input(
         &self,
         case: &Case,
-        neighbours: u32,
+        inspection: Inspection,
         change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>,
     ) -> Shot {
         let session = &mut *self.session.borrow_mut();
-        session.renderer.inspect(Inspection { walks: true, neighbours });
+        session.renderer.inspect(Inspection { walks: true, ..inspection });
         session.resize(case.size).expect("size");
         let input = FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null());
         let input = input.eye_inside(case.eye_inside);
@@ -182,7 +192,8 @@ impl<'a> Driver<'a> {
         let mut frame = inspect::uniforms(&case.camera, &case.settings, case.size, &space, bounds);
         frame.eye_inside = f32::from(case.eye_inside);
         let counters = session.counters().expect("counters");
-        Shot { frame, space, size: case.size, picture, targets, counters }
+        let block = session.block().expect("block");
+        Shot { frame, block, space, size: case.size, picture, targets, counters }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::{
     background::{HostScene, Painted},
+    drivers::SKY,
     support::{Case, Choose, Driver, Shot, camera, each_driver, random_cloud},
 };
 use glam::{DVec3, Vec3};
@@ -194,10 +195,10 @@ fn compare_outcomes(driver: &Driver, pairs: &[Pair], outcomes: &[u32]) {
 }
 
 /// One frame; the pixels that walks with a length come from.
-fn compare(driver: &Driver, case: &Case, sky: &Equirect) -> Vec<Pair> {
+fn compare(driver: &Driver, case: &Case) -> Vec<Pair> {
     let s = &case.settings.walk();
     println!("  refractions {}, reflections {}, {:?}:", s.refractions, s.internal_reflections, s.fresnel);
-    let pairs = pairs(driver, case, &driver.shoot(case), None, sky);
+    let pairs = pairs(driver, case, &driver.shoot(case), None, &SKY);
     for pair in &pairs {
         let (gpu, twin) = (first_volume(pair.pattern), first_volume(pair.twin.pattern));
         assert_eq!(gpu, twin, "{}: first volume of pixel {}", driver.name, pair.index);
@@ -235,7 +236,7 @@ pub fn compare_before(driver: &Driver, case: &Case, painted: &Painted, backgroun
     let shot = driver.shoot_before(case, images.input(), background);
     let depth: Vec<f64> = painted.0.iter().map(|d| d / shot.space.radius).collect();
     let scene = Scene { depth: &depth, color: &painted.1, sky: background == Background::Host };
-    let pairs = pairs(driver, case, &shot, Some(scene), &Equirect::procedural_sky());
+    let pairs = pairs(driver, case, &shot, Some(scene), &SKY);
     let (liquid, other): (Vec<_>, Vec<_>) = pairs.iter().partition(|p| p.pattern != PATTERN_NONE);
     println!("  {background:?}, refractions {}: {} pixels of liquid", case.settings.walk().refractions, liquid.len());
     assert!(liquid.len() > 500, "{}: only {} pixels of liquid", driver.name, liquid.len());
@@ -282,7 +283,6 @@ fn a_dam_break_is_walked_as_its_twin_walks_it() {
     let eye = 0.5 * (low + high) + 0.8 * (high - low).length() * Vec3::new(0.5, 0.45, 0.75).normalize();
     let camera = camera(eye, 0.5 * (low + high), SIZE);
     let tinted = Vec3::new(2.0, 0.7, 0.3);
-    let sky = Equirect::procedural_sky();
     each_driver(|driver| {
         let mut all = Vec::new();
         for settings in [
@@ -294,7 +294,7 @@ fn a_dam_break_is_walked_as_its_twin_walks_it() {
             optics(1, 4, Fresnel::Exact, CLEAR),
         ] {
             let case = Case { particles: particles.clone(), camera, settings, size: SIZE, eye_inside: false };
-            all.extend(compare(driver, &case, &sky));
+            all.extend(compare(driver, &case));
         }
         let outcomes = [OUTCOME_HIT, OUTCOME_SIDE_WALL, OUTCOME_LEFT_VIEW, OUTCOME_REFLECTION_LIMIT];
         compare_outcomes(driver, &all, &outcomes);
@@ -303,7 +303,6 @@ fn a_dam_break_is_walked_as_its_twin_walks_it() {
 
 #[test]
 fn random_clouds_are_walked_as_their_twin_walks_them() {
-    let sky = Equirect::procedural_sky();
     let tinted = Vec3::new(0.2, 1.5, 3.0);
     let cloud = |seed, splash, body| -> Particles {
         random_cloud(seed, 0.12, Vec3::new(-0.8, -0.6, -0.5), Vec3::new(0.8, 0.6, 0.5), splash, body)
@@ -318,7 +317,7 @@ fn random_clouds_are_walked_as_their_twin_walks_them() {
             (cloud(5, 0, 40), optics(2, 4, Fresnel::Exact, CLEAR)),
         ] {
             let camera = camera(Vec3::new(0.3, 0.4, 2.2), Vec3::ZERO, SIZE);
-            all.extend(compare(driver, &Case { particles, camera, settings, size: SIZE, eye_inside: false }, &sky));
+            all.extend(compare(driver, &Case { particles, camera, settings, size: SIZE, eye_inside: false }));
         }
         // Nothing reaches to the picture's edge.
         compare_outcomes(driver, &all, &[OUTCOME_HIT, OUTCOME_SIDE_WALL, OUTCOME_REFLECTION_LIMIT]);

@@ -189,7 +189,8 @@ fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dy
         return Ok(no_liquid);
     }
     let memory = session.renderer.memory();
-    let mut inspection = Inspection { walks: true, neighbours: if job.args.dump_neighbours { 256 } else { 0 } };
+    let mut inspection =
+        Inspection { walks: true, neighbours: if job.args.dump_neighbours { 256 } else { 0 }, ..Default::default() };
     session.renderer.inspect(inspection);
     session.frame(&input)?;
     if job.args.dump_neighbours {

@@ -3,7 +3,7 @@
 use super::Bilateral;
 use crate::{
     shader::Frame,
-    smooth::twin::{Average, Map, Pixel, exp_ulp, projected, reach},
+    smooth::twin::{Average, Count, Map, Pixel, clipped, exp_ulp, projected, reach},
 };
 
 /// What the filter can be told; Imai16 §3.1 prints no number.
@@ -46,6 +46,12 @@ pub fn bilateral(frame: &Frame, depth: &[f32], p: &Parameters) -> Vec<Pixel> {
             average.result(own)
         })
     })
+}
+
+/// What both bilateral filters count.
+pub(crate) fn counted(frame: &Frame, depth: &[f32], p: &Parameters) -> Vec<(&'static str, Count)> {
+    let clipped = if p.projected { clipped(frame, depth, 3.0 * p.sigma_space, p.reach) } else { Count::default() };
+    vec![("bilateral_kernel_clipped", clipped)]
 }
 
 /// A pixel's result with the kernel that its depth gives it, or with either of two.

@@ -4,7 +4,7 @@
 use super::CurvatureFlow;
 use crate::{
     shader::Frame,
-    smooth::twin::{Map, Pixel},
+    smooth::twin::{Count, Map, Pixel},
 };
 
 /// What the filter can be told.
@@ -29,11 +29,9 @@ pub struct Flow {
     /// Depths.
     pub pixel: Vec<Pixel>,
     /// Pixels whose step was shortened to the stable one.
-    pub shortened: u32,
+    pub shortened: Count,
     /// Pixels that were not moved, as they would have come to lie before the near plane.
-    pub refused: u32,
-    /// Pixels where rounding decides one of the two.
-    pub undecided: u32,
+    pub refused: Count,
 }
 
 /// One explicit step.
@@ -46,12 +44,13 @@ pub fn flow(frame: &Frame, depth: &[f32], p: &Parameters) -> Flow {
     let map = Map::new(frame, depth);
     let [ax, ay] = [frame.pixel_scale.x, frame.pixel_scale.y].map(|a| f64::from(a).abs());
     let (cx, cy) = (1.0 / ax, 1.0 / ay);
-    let (mut shortened, mut refused, mut undecided) = (0, 0, 0);
+    let (mut shortened, mut refused) = (Count::default(), Count::default());
     let pixel = map.each(|x, y, own| {
         let (d, sizes) = derivatives(&map, x, y, p.jump);
         let stable = own / (ax + ay);
         let step = f64::from(p.time_step).min(stable);
-        shortened += u32::from(f64::from(p.time_step) > stable);
+        let excess = f64::from(p.time_step) - stable;
+        shortened.add(excess > 0.0, excess.abs() < 4.0 * f64::from(f32::EPSILON) * stable);
         let rate = |d: [f64; 5]| mean_curvature([cx, cy], -own, &d.map(|v| -v));
         let moved = own - rate(d) * step;
         // The rises that a derivative adds up are rounded by half a step each, and so is their sum.
@@ -64,16 +63,14 @@ pub fn flow(frame: &Frame, depth: &[f32], p: &Parameters) -> Flow {
         let pixel = Pixel { depth: moved, slack, or: None };
         let near = f64::from(frame.near);
         let (before, close) = (moved < near, (moved - near).abs() <= slack);
-        let doubt = close || (f64::from(p.time_step) - stable).abs() < 4.0 * f64::from(f32::EPSILON) * stable;
-        undecided += u32::from(doubt);
-        refused += u32::from(before);
+        refused.add(before, close);
         match (before, close) {
             (false, false) => pixel,
             (true, false) => Pixel { depth: own, slack: 0.0, or: None },
             (_, true) => Pixel { or: Some(own), ..pixel },
         }
     });
-    Flow { pixel, shortened, refused, undecided }
+    Flow { pixel, shortened, refused }
 }
 
 /// d_x, d_y, d_xx, d_yy, d_xy: central differences; zero across a boundary. Then what the rises they are made of would add

@@ -9,7 +9,7 @@ use crate::{
 /// What the filter can be told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
-    /// Pixels to either side, as a length in particle radii at the pixel's depth; at least 0. Three sigma. Truong18's own
+    /// Pixels to either side, as a length in particle radii at the pixel's depth; at least 0. Three sigma. Truong18's demo
     /// program: 0.5.
     pub kernel: f32,
     /// δ: how far beyond what is already in range a depth may lie, in particle radii; more than 0. Truong18: 10.
@@ -38,7 +38,7 @@ impl From<&NarrowRange> for Parameters {
 }
 
 impl Parameters {
-    /// The clean-up that follows the two directions.
+    /// The clean-up that ends the two directions' turns.
     pub fn clean_up(self) -> Parameters {
         Parameters { reach: 4, fixed: true, ..self }
     }
@@ -117,7 +117,7 @@ pub fn narrow_range(frame: &Frame, depth: &[f32], p: &Parameters) -> Vec<Pixel> 
     })
 }
 
-/// One direction of the separated filter; an iteration is rows, columns, and the clean-up over a small fixed window.
+/// One direction of the separated filter.
 pub fn narrow_range_along(frame: &Frame, depth: &[f32], p: &Parameters, axis: Axis) -> Vec<Pixel> {
     let map = Map::new(frame, depth);
     let (sx, sy) = axis.step();

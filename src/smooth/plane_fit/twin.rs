@@ -6,7 +6,7 @@
 use super::{PlaneFit, Weighting};
 use crate::{
     shader::{FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT, Frame},
-    smooth::twin::{Input, Pixel, projected, reach},
+    smooth::twin::{Count, Input, Pixel, Smoothed, clipped, projected, reach},
     twin::normal::decode_normal,
 };
 use glam::{DVec2, DVec3};
@@ -182,7 +182,7 @@ pub fn is_close(p: &PlaneFit, frame: &Frame, own: f32, plane: &Plane) -> bool {
 
 /// The same as every filter's twin gives it: where rounding decides whether a guard fires, a pixel is where it was or on
 /// its plane.
-pub(super) fn pixels(p: &PlaneFit, input: &Input) -> Vec<Pixel> {
+pub(super) fn smoothed(p: &PlaneFit, input: &Input) -> Smoothed {
     let fit = plane_fit(input.frame, input.depth, input.normal, p);
     let pixel = |(i, plane): (usize, &Option<Plane>)| {
         let own = input.depth[i];
@@ -196,5 +196,24 @@ pub(super) fn pixels(p: &PlaneFit, input: &Input) -> Vec<Pixel> {
         let other = fit.other[i].map(|o| Pixel { depth: o.depth, slack: rounding(p, own, &o), or: None });
         pixel.either(other)
     };
-    fit.plane.iter().enumerate().map(pixel).collect()
+    let pixels = fit.plane.iter().enumerate().map(pixel).collect();
+    let count = |outcome: Outcome| {
+        let mut count = Count::default();
+        for (i, plane) in fit.plane.iter().enumerate() {
+            let Some(plane) = plane else { continue };
+            // Where rounding decides on the window, it may decide on the guard too.
+            let close = fit.other[i].is_some() || is_close(p, input.frame, input.depth[i], plane);
+            count.add(fit.outcome[i] == outcome, close);
+        }
+        count
+    };
+    let clipped =
+        if p.projected { clipped(input.frame, input.depth, 0.5 * p.width, p.window / 2) } else { Count::default() };
+    let counted = vec![
+        ("plane_fit_zero_normal_sum", count(Outcome::ZeroNormal)),
+        ("plane_fit_grazing", count(Outcome::Grazing)),
+        ("plane_fit_update_too_long", count(Outcome::Unbounded)),
+        ("plane_fit_window_clipped", clipped),
+    ];
+    Smoothed::new(pixels, counted)
 }
