@@ -131,8 +131,10 @@
 #define SIDE_NUDGE 0.01
 // Tiles and pixels that are looked at before a wall may be met, at most.
 #define MARCH_STEPS 1024
-// Samples of g that find and narrow one change of its sign, at most.
-#define CROSS_STEPS 48
+// Samples of g that look for a change of its sign, at most.
+#define CROSS_STEPS 32
+// ... and that narrow it.
+#define NARROW_STEPS 14
 // How often the two take turns, at most.
 #define WALL_TRIES 16
 // Pixels after its start on a wall within which a ray still counts as on its own side.

@@ -176,7 +176,8 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
     Body before = Body(HOLE, 0.0, SIDE_FRONT, bvec2(false)), after = before; // at a and b
     bool known = s <= start, bracketed = false, done = false, found = false;
     vec2 along = line.end - line.start;
-    for (int i = 0; i < CROSS_STEPS && !done; ++i) {
+    // A bracket that is found late is narrowed all the same.
+    for (int i = 0, last = CROSS_STEPS; i < last && !done; ++i) {
         float d = depth_at(line, at);
         Body body = body_at(line.start + at * along, d);
         float f = sign_of_side * body.g;
@@ -206,6 +207,7 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
             fb = f;
             after = body;
             bracketed = known;
+            if (known) last = i + NARROW_STEPS;
         }
         if (bracketed) {
             found = true;
@@ -224,6 +226,7 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
                 a = 0.0;
                 fa = -1e-6;
                 bracketed = true;
+                last = i + NARROW_STEPS;
                 at = 0.5 * b;
             }
         }
@@ -240,7 +243,10 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
     }
     bool at_inner = abs(inner.g) <= accepted;
     bool surface = at_inner || abs(outer.g) <= accepted;
-    float hit = clamp(at, a, b);
+    // The line through both ends, if both are near the surface; else the end that is, or the middle.
+    bool near_a = abs(before.g) <= accepted, near_b = abs(after.g) <= accepted;
+    float hit = near_a == near_b ? 0.5 * (a + b) : (near_a ? a : b);
+    if (near_a && near_b && before.g != after.g) hit = clamp(b - after.g * (b - a) / (after.g - before.g), a, b);
     wall.t = t_at(ray, hit);
     wall.cls = CLASS_BODY;
     wall.side = !surface;
