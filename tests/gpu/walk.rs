@@ -136,7 +136,7 @@ const AGREEMENTS: [Agreement; 5] = [
         both: 0.95,
         pattern: 0.99,
         direction: 0.95,
-        length: (0.97, 0.25),
+        length: (0.96, 0.25),
         color: 0.99,
     },
     Agreement { outcome: OUTCOME_HOLE, both: 0.85, pattern: 0.98, direction: 0.75, length: (0.6, 1.0), color: 0.75 },
