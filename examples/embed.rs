@@ -118,7 +118,7 @@ fn main() -> Result<()> {
         let mut renderer = Renderer::new(host, PICTURE)?;
         renderer.resize(SIZE)?;
         let positions = positions();
-        let input = prepare::Input { positions: &positions, radius: RADIUS, classes: None, ellipsoids: None };
+        let input = prepare::Input::new(&positions, RADIUS);
         renderer.set_particles(&prepare::prepare(&input, &Default::default())?.0)?;
         let mut settings = Settings::default();
         settings.liquid.absorption = Vec3::new(0.9, 0.3, 0.15);

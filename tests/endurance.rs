@@ -156,7 +156,7 @@ fn run(gpu: &Gpu, kind: &Kind) -> Endured {
     let mut session = Session::new(gpu, SIZE, &grey).expect("session");
     let settings = settings(kind);
     session.renderer.inspect(Inspection { walks: kind.debug, ..Inspection::default() });
-    let input = prepare::Input { positions: &positions, radius, classes: None, ellipsoids: None };
+    let input = prepare::Input::new(&positions, radius);
     session.renderer.set_particles(&prepare::prepare(&input, &Default::default()).expect("prepared").0).expect("given");
     let upload = Upload::new(gpu, bytemuck::cast_slice(&positions)).expect("upload");
     let packed = DevicePositions::packed(upload.buffer, positions.len() as u32, radius);

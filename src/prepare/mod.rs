@@ -4,9 +4,18 @@
 //! ([`DevicePositions`]). The result depends on the set of particles alone: a shuffled input gives
 //! bit-identical output, on any number of threads.
 
+#[cfg(not(feature = "inspect"))]
+mod density;
+#[cfg(feature = "inspect")]
 pub mod density;
 mod device;
+#[cfg(not(feature = "inspect"))]
+mod ellipsoids;
+#[cfg(feature = "inspect")]
 pub mod ellipsoids;
+#[cfg(not(feature = "inspect"))]
+mod neighbours;
+#[cfg(feature = "inspect")]
 pub mod neighbours;
 mod options;
 mod spacing;
@@ -31,6 +40,7 @@ use options::Scale;
 
 /// One frame of particles, in world units.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Input<'a> {
     /// Centres.
     pub positions: &'a [Vec3],
@@ -42,8 +52,26 @@ pub struct Input<'a> {
     pub ellipsoids: Option<&'a [Mat3]>,
 }
 
+impl<'a> Input<'a> {
+    /// Centres, and the radius of all: classes follow from the threshold, ellipsoids are fitted.
+    pub fn new(positions: &'a [Vec3], radius: f32) -> Input<'a> {
+        Input { positions, radius, classes: None, ellipsoids: None }
+    }
+
+    /// Classes of the caller's, one for each particle.
+    pub fn classes(self, classes: Option<&'a [Class]>) -> Input<'a> {
+        Input { classes, ..self }
+    }
+
+    /// Ellipsoids of the caller's, one for each particle.
+    pub fn ellipsoids(self, ellipsoids: Option<&'a [Mat3]>) -> Input<'a> {
+        Input { ellipsoids, ..self }
+    }
+}
+
 /// How many particles went which way; the guards count particles of the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Report {
     /// Particles drawn as splash.
     pub splash: usize,
@@ -62,6 +90,7 @@ pub struct Report {
 /// Why particles could not be prepared. Indices are those of the input.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs)] // the fields are what the messages below say they are
+#[non_exhaustive]
 pub enum PrepareError {
     /// A radius outside of [`crate::space::RADII`].
     #[error("particle radius {0:e}: {remedy}", remedy = device::radius_remedy())]

@@ -61,7 +61,7 @@ fn block(low: [i32; 3], high: [i32; 3]) -> Vec<Vec3> {
 }
 
 fn input(positions: &[Vec3], radius: f32) -> Input<'_> {
-    Input { positions, radius, classes: None, ellipsoids: None }
+    Input::new(positions, radius)
 }
 
 fn run(positions: &[Vec3], radius: f32) -> (Particles, Report) {
@@ -74,6 +74,13 @@ fn bits(particles: &Particles) -> (usize, Vec<[u32; 12]>) {
         std::array::from_fn(|i| columns[i / 3][i % 3].to_bits())
     };
     (particles.splash_count, particles.ellipsoids.iter().map(bits).collect())
+}
+
+/// A report of what is set, and else of nothing.
+fn report_of(set: impl Fn(&mut Report)) -> Report {
+    let mut report = Report::default();
+    set(&mut report);
+    report
 }
 
 #[test]
@@ -104,7 +111,7 @@ fn shuffled_input_gives_the_same_bits() {
         let positions: Vec<_> = given.iter().map(|g| g.0).collect();
         let classes: Vec<_> = given.iter().map(|g| g.1).collect();
         let axes: Vec<_> = given.iter().map(|g| g.2).collect();
-        let input = Input { positions: &positions, radius: 1.0, classes: Some(&classes), ellipsoids: Some(&axes) };
+        let input = Input::new(&positions, 1.0).classes(Some(&classes)).ellipsoids(Some(&axes));
         bits(&prepare(&input, &Options::default()).unwrap().0)
     };
     assert!(prepared(&given) == prepared(&random.shuffled(&given)));
@@ -116,12 +123,18 @@ fn given_classes_and_ellipsoids_are_used() {
     let classes = [Class::Body, Class::Splash, Class::Body];
     let skewed = Mat3::from_cols(Vec3::X, Vec3::new(0.5, -2.0, 0.0), Vec3::Z * 1e-3);
     let axes = [skewed, Mat3::ZERO, skewed * 2.0];
-    let given = Input { positions: &positions, radius: 1.0, classes: Some(&classes), ellipsoids: None };
+    let given = Input::new(&positions, 1.0).classes(Some(&classes));
     let (particles, report) = prepare(&given, &Options::default()).unwrap();
-    assert_eq!(report, Report { splash: 1, body: 2, ..Report::default() });
+    assert_eq!(
+        report,
+        report_of(|r| {
+            r.splash = 1;
+            r.body = 2;
+        })
+    );
     assert_eq!(particles.ellipsoids[0].center, Vec3::ZERO);
 
-    let given = Input { ellipsoids: Some(&axes), ..given };
+    let given = given.ellipsoids(Some(&axes));
     let (particles, _) = prepare(&given, &Options::default()).unwrap();
     let expected = [(positions[1], Mat3::IDENTITY), (positions[2], axes[2]), (positions[0], axes[0])];
     for (center, axes) in expected {
@@ -132,7 +145,7 @@ fn given_classes_and_ellipsoids_are_used() {
     for bad in [Mat3::ZERO, Mat3::NAN, Mat3::from_cols(Vec3::X, Vec3::X, Vec3::Z)] {
         // The second is a splash and ignored; the third comes first in canonical order.
         for (axes, index) in [([skewed, bad, bad], 2), ([bad, bad, bad], 0)] {
-            let given = Input { ellipsoids: Some(&axes), ..given };
+            let given = given.ellipsoids(Some(&axes));
             let error = prepare(&given, &Options::default()).err();
             assert_eq!(error, Some(PrepareError::Ellipsoid { index }));
         }
@@ -150,10 +163,10 @@ fn errors_name_what_is_wrong() {
     let error = fails(&input(&points, 1.0), &defaults);
     assert!(matches!(error, PrepareError::Position { index: 2, .. }));
     assert!(error.to_string().starts_with("particle 2 at [0, NaN, 0]"), "{error}");
-    let short = Input { classes: Some(&[Class::Body]), ..input(&points[..2], 1.0) };
+    let short = input(&points[..2], 1.0).classes(Some(&[Class::Body]));
     let expected = PrepareError::Length { what: "classes", found: 1, particles: 2 };
     assert_eq!(fails(&short, &defaults), expected);
-    let short = Input { ellipsoids: Some(&[]), ..input(&points[..2], 1.0) };
+    let short = input(&points[..2], 1.0).ellipsoids(Some(&[]));
     assert!(matches!(fails(&short, &defaults), PrepareError::Length { what: "ellipsoids", .. }));
     for (name, options) in [
         ("support", Options { support: Some(1.9), ..defaults }),

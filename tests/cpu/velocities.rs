@@ -154,7 +154,7 @@ fn speeds_go_with_their_particles() {
     *velocities.last_mut().expect("one") *= 2.0;
     let centres_stay = Options::default().ellipsoids(Fit::YuTurk).smoothing(0.0);
     let run = |positions: &[Vec3], velocities: &[Vec3]| {
-        let input = Input { positions, radius: 0.05, classes: None, ellipsoids: None };
+        let input = Input::new(positions, 0.05);
         prepare::prepare_with_velocities(&input, velocities, &centres_stay, &|_| ())
     };
     let (particles, report, speeds) = run(&positions, &velocities).expect("it prepares");
@@ -170,7 +170,7 @@ fn speeds_go_with_their_particles() {
     positions.reverse();
     velocities.reverse();
     assert_eq!(run(&positions, &velocities).expect("it prepares"), (particles.clone(), report, speeds));
-    let still = Input { positions: &positions, radius: 0.05, classes: None, ellipsoids: None };
+    let still = Input::new(&positions, 0.05);
     assert_eq!(prepare::prepare(&still, &centres_stay).expect("it prepares").0, particles);
 
     assert!(matches!(run(&positions, &velocities[1..]), Err(PrepareError::Length { what: "velocities", .. })));

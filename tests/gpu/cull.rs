@@ -223,7 +223,7 @@ fn the_order_of_input_changes_no_bit() {
     positions.extend((0..40).map(|_| random.point(Vec3::splat(-0.9), Vec3::splat(0.9))));
     positions.extend_from_within(0..40); // at the same place: exact ties in depth
     let prepared = |positions: &[Vec3]| {
-        let input = Input { positions, radius, classes: None, ellipsoids: None };
+        let input = Input::new(positions, radius);
         prepare(&input, &Options::default()).expect("valid").0
     };
     let camera = camera(Vec3::new(0.3, 0.4, 2.0), Vec3::ZERO, size);

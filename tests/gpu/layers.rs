@@ -79,7 +79,7 @@ fn order_and_primitives_do_not_show() {
     positions.extend((0..40).map(|_| random.point(Vec3::splat(-0.9), Vec3::splat(0.9))));
     positions.extend_from_within(0..40);
     let prepared = |positions: &[Vec3]| {
-        let input = Input { positions, radius: 0.05, classes: None, ellipsoids: None };
+        let input = Input::new(positions, 0.05);
         prepare(&input, &Options::default()).expect("valid").0
     };
     let view = camera(Vec3::new(0.3, 0.4, 2.0), Vec3::ZERO, SIZE);

@@ -333,7 +333,7 @@ pub fn dam_break(size: [u32; 2]) -> Case {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/dam_break.bgeo");
         let file = meniscus::io::particles::read(&path).expect("assets/dam_break.bgeo");
         let positions: Vec<_> = file.positions.iter().map(|p| p.as_vec3()).collect();
-        let input = Input { positions: &positions, radius: 0.025, classes: None, ellipsoids: None };
+        let input = Input::new(&positions, 0.025);
         prepare(&input, &Options::default()).expect("it is sound").0
     });
     let (low, high) = PARTICLES.bounds().expect("it has particles");

@@ -119,7 +119,7 @@ fn agrees(driver: &Driver, name: &str, radius: f32, positions: &[Vec3], options:
     let three = |all: &[f32], k: usize| Vec3::from_slice(&all[3 * k..]);
     // One particle after the other through the CPU's path keeps the input's order.
     let given: Vec<Class> = classes.clone();
-    let input = Input { positions, radius, classes: Some(&given), ellipsoids: None };
+    let input = Input::new(positions, radius).classes(Some(&given));
     let (want, report) = prepare(&input, options).expect("prepared");
     let mut rest: Vec<_> = want.ellipsoids.iter().map(|e| (e.center, shot.space.pack(e))).collect();
     let mut worst: f32 = 0.0;

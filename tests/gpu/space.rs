@@ -29,7 +29,7 @@ fn liquid() -> Vec<Vec3> {
 /// The whole scene `scale` times as large.
 fn scaled(scale: f32, shift: Vec3) -> (Case, Vec<Vec3>) {
     let positions: Vec<_> = liquid().into_iter().map(|p| p * scale + shift).collect();
-    let input = Input { positions: &positions, radius: 0.1 * scale, classes: None, ellipsoids: None };
+    let input = Input::new(&positions, 0.1 * scale);
     let particles = prepare(&input, &Options::default()).expect("prepared").0;
     let aspect = SIZE[0] as f32 / SIZE[1] as f32;
     let eye = Vec3::new(0.6, 0.8, 3.0) * scale + shift;
@@ -88,7 +88,7 @@ fn every_place_gives_the_same_picture() {
     };
     let at = |shift: Vec3| {
         let positions: Vec<_> = positions.iter().map(|p| *p + shift).collect();
-        let input = Input { positions: &positions, radius: 0.125, classes: None, ellipsoids: None };
+        let input = Input::new(&positions, 0.125);
         let particles = prepare(&input, &Options::default()).expect("prepared").0;
         let mut camera = case.camera;
         camera.view *= Mat4::from_translation(-shift);
@@ -112,7 +112,7 @@ fn every_place_gives_the_same_picture() {
 fn radii_without_room_are_refused() {
     for scale in [1e-32, 1e33] {
         let positions: Vec<_> = liquid().into_iter().map(|p| p * scale).collect();
-        let input = Input { positions: &positions, radius: 0.1 * scale, classes: None, ellipsoids: None };
+        let input = Input::new(&positions, 0.1 * scale);
         let said = prepare(&input, &Options::default()).expect_err("no room").to_string();
         assert!(said.contains("particle radius") && said.contains("1e-31 to 1e31"), "{said}");
     }
@@ -167,7 +167,7 @@ fn crowds_take_no_longer_than_liquid() {
     let spots = [(100_000, Vec3::ZERO), (5_000, Vec3::new(1.1, 0.0, 0.0)), (3, Vec3::new(-1.1, 0.2, 0.0))];
     let positions: Vec<_> = spots.iter().flat_map(|(n, p)| vec![*p; *n]).collect();
     let start = std::time::Instant::now();
-    let input = Input { positions: &positions, radius: 0.1, classes: None, ellipsoids: None };
+    let input = Input::new(&positions, 0.1);
     let (particles, report) = prepare(&input, &Options::default()).expect("prepared");
     println!("{} s on the CPU", start.elapsed().as_secs_f64());
     // All pairs would be ten thousand million, twice over.

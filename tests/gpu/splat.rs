@@ -38,7 +38,7 @@ pub fn dam_break() -> &'static Case {
         let file = meniscus::io::particles::read(path.as_ref()).expect("the frame reads");
         let positions: Vec<Vec3> = file.positions.iter().map(|p| p.as_vec3()).collect();
         use meniscus::prepare::{Input, Options, prepare};
-        let input = Input { positions: &positions, radius: 0.025, classes: None, ellipsoids: None };
+        let input = Input::new(&positions, 0.025);
         let particles = prepare(&input, &Options::default()).expect("it prepares").0;
         let (low, high) = particles.bounds().expect("it is not empty");
         let (middle, size) = (0.5 * (low + high), [320, 240]);

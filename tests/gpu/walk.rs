@@ -277,7 +277,7 @@ fn a_dam_break_is_walked_as_its_twin_walks_it() {
     let file = meniscus::io::particles::read(path).expect("the asset");
     let middle = file.positions.iter().sum::<DVec3>() / file.positions.len() as f64;
     let positions: Vec<Vec3> = file.positions.iter().map(|p| (*p - middle).as_vec3()).collect();
-    let input = meniscus::prepare::Input { positions: &positions, radius: 0.025, classes: None, ellipsoids: None };
+    let input = meniscus::prepare::Input::new(&positions, 0.025);
     let (particles, _) = meniscus::prepare::prepare(&input, &meniscus::prepare::Options::default()).expect("prepared");
     let (low, high) = particles.bounds().unwrap();
     let eye = 0.5 * (low + high) + 0.8 * (high - low).length() * Vec3::new(0.5, 0.45, 0.75).normalize();

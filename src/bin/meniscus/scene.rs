@@ -111,12 +111,7 @@ impl Scene {
                     .into(),
             );
         }
-        let input = Input {
-            positions: &positions,
-            radius: radius as f32,
-            classes: classes.as_deref(),
-            ellipsoids: axes.as_deref(),
-        };
+        let input = Input::new(&positions, radius as f32).classes(classes.as_deref()).ellipsoids(axes.as_deref());
         let velocities: Option<Vec<Vec3>> =
             file.velocities.as_ref().map(|all| all.iter().map(|v| v.as_vec3()).collect());
         let (particles, report, speeds, prepare_ms) = make(&input, velocities.as_deref(), &options, prepare)?;
@@ -132,7 +127,7 @@ impl Scene {
     pub fn synthetic(positions: Vec<Vec3>, radius: f32, picture: &Picture) -> Result<Scene, Box<dyn Error>> {
         let prepare = picture.preparer();
         let options = Options { search: prepare.search(picture.preparation.search), ..picture.preparation };
-        let input = Input { positions: &positions, radius, classes: None, ellipsoids: None };
+        let input = Input::new(&positions, radius);
         let (particles, report, speeds, prepare_ms) = make(&input, None, &options, prepare)?;
         Ok(Scene {
             particles,

@@ -3,9 +3,9 @@
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use meniscus::particles::Ellipsoid;
 use meniscus::prepare::ellipsoids::eigen_symmetric;
-use meniscus::prepare::{Fit, Options, Report, prepare};
+use meniscus::prepare::{Fit, Options, prepare};
 
-use super::{Random, block, input};
+use super::{Random, block, input, report_of};
 
 #[test]
 fn eigen_solver_reconstructs() {
@@ -154,7 +154,13 @@ fn guards_are_counted() {
     let count = |cloud: &[Vec3]| prepare(&input(cloud, 1.0), &body).unwrap().1;
     // 26 particles have 25 neighbours each: one too few.
     assert_eq!(count(&vec![Vec3::ONE; 26]).few_neighbours, 26);
-    assert_eq!(count(&vec![Vec3::ONE; 27]), Report { body: 27, degenerate: 27, ..Report::default() });
+    assert_eq!(
+        count(&vec![Vec3::ONE; 27]),
+        report_of(|r| {
+            r.body = 27;
+            r.degenerate = 27;
+        })
+    );
     // A long row: the middle is cut, the ends see half of it and are not; all are thickened.
     let line: Vec<_> = (0..200).map(|i| Vec3::X * 0.2 * i as f32).collect();
     let report = count(&line);
@@ -167,11 +173,30 @@ fn in_place_cuts_are_counted() {
     let count = |cloud: &[Vec3], options: &Options| prepare(&input(cloud, 1.0), options).unwrap().1;
     let body = Options::default().splash_threshold(0.0);
     // What lies on one spot spreads alike along all axes; a row is thin and long, a block's inside is neither.
-    assert_eq!(count(&[Vec3::ONE; 40], &body), Report { body: 40, ..Report::default() });
+    assert_eq!(
+        count(&[Vec3::ONE; 40], &body),
+        report_of(|r| {
+            r.body = 40;
+        })
+    );
     let row = block([0; 3], [0, 0, 19]);
-    assert_eq!(count(&row, &body), Report { body: 20, clamped_ratio: 20, clamped_long: 20, ..Report::default() });
+    assert_eq!(
+        count(&row, &body),
+        report_of(|r| {
+            r.body = 20;
+            r.clamped_ratio = 20;
+            r.clamped_long = 20;
+        })
+    );
     let sheet = block([0; 3], [0, 9, 9]);
-    assert_eq!(count(&sheet, &body), Report { body: 100, clamped_ratio: 100, clamped_long: 100, ..Report::default() });
+    assert_eq!(
+        count(&sheet, &body),
+        report_of(|r| {
+            r.body = 100;
+            r.clamped_ratio = 100;
+            r.clamped_long = 100;
+        })
+    );
     let inside = count(&block([0; 3], [9; 3]), &body);
     assert!(inside.clamped_ratio <= 1000 - 512 && inside.degenerate + inside.few_neighbours == 0, "{inside:?}");
 }
