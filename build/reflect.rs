@@ -59,7 +59,8 @@ const DIM_CUBE: u32 = 3;
 const FRAGMENT: u32 = 4;
 
 /// Image formats of storage images that passes use.
-const FORMATS: [(u32, &str); 4] = [(1, "R32G32B32A32_SFLOAT"), (3, "R32_SFLOAT"), (6, "R32G32_SFLOAT"), (33, "R32_UINT")];
+const FORMATS: [(u32, &str); 4] =
+    [(1, "R32G32B32A32_SFLOAT"), (3, "R32_SFLOAT"), (6, "R32G32_SFLOAT"), (33, "R32_UINT")];
 
 enum Type {
     /// Bytes of a float or a signed integer.

@@ -73,7 +73,8 @@ pub(super) fn surface(
         // The depth test works on near / d: nearest is largest. Nothing there: 0 for fronts, 1 for backs.
         let (compare, clear) = if side == SIDE_FRONT { (CompareOp::GREATER, 0.0) } else { (CompareOp::LESS, 1.0) };
         let rendering = Rendering::into(depth, side).and(normal, side).testing(test, clear, compare);
-        let draws = classes.iter().flat_map(|class| particles(scene, drawn, &shader::SPLAT_FRAG[0], *class, side, None));
+        let draws =
+            classes.iter().flat_map(|class| particles(scene, drawn, &shader::SPLAT_FRAG[0], *class, side, None));
         plan.render(names.passes[side as usize], rendering, draws.collect());
     }
     Surface { depth, normal, sides }

@@ -3,7 +3,7 @@
 use super::{Call, External, Groups, Home, Plan, Rendering, Target, Vertices};
 use crate::{
     resources::ImageSpec,
-    shader::{NORMALS_COMP, PLANE_FIT_COMP, SPLAT_VERT, THICKNESS_FRAG, TILES_COMP},
+    shader::{NORMALS_COMP, PLANE_FIT_COMP, SPLAT_VERT, THICKNESS_FRAG, WALLS_COMP},
 };
 use ash::vk::{CompareOp, Format};
 
@@ -23,11 +23,11 @@ fn plan() -> (Plan, Maps) {
 }
 
 fn tiles(m: &Maps) -> Call {
-    reading(m).write("front_tiles", m.out)
+    reading(m).write("walls", m.out)
 }
 
 fn reading(m: &Maps) -> Call {
-    both(Call::compute(&TILES_COMP)).read("body_depth", m.depth).read("splash_depth", m.depth)
+    both(Call::compute(&WALLS_COMP)).read("body_depth", m.depth).read("splash_depth", m.depth)
 }
 
 fn both(call: Call) -> Call {
@@ -54,7 +54,7 @@ fn names_have_to_be_the_shaders() {
     refused(|_, m| tiles(m).read("body_dept", m.depth), "no shader has a binding body_dept");
     refused(|_, m| tiles(m).read("body_depth", m.depth), "body_depth is bound twice");
     refused(
-        |_, m| both(Call::compute(&TILES_COMP)).read("body_depth", m.depth).write("front_tiles", m.out),
+        |_, m| both(Call::compute(&WALLS_COMP)).read("body_depth", m.depth).write("walls", m.out),
         "nothing is bound to splash_depth",
     );
     refused(|_, m| tiles(m).constant("HAS_FOAM", true), "no shader has a constant HAS_FOAM");
@@ -80,10 +80,10 @@ fn kinds_have_to_be_the_shaders() {
     // A map of normals holds integers.
     refused(
         |_, m| {
-            both(Call::compute(&TILES_COMP))
+            both(Call::compute(&WALLS_COMP))
                 .read("body_depth", m.normal)
                 .read("splash_depth", m.depth)
-                .write("front_tiles", m.out)
+                .write("walls", m.out)
         },
         "and normal is not",
     );
@@ -97,29 +97,29 @@ fn kinds_have_to_be_the_shaders() {
     let buffer = |plan: &mut Plan| plan.buffer("b", 4);
     refused(
         |plan, m| {
-            both(Call::compute(&TILES_COMP))
+            both(Call::compute(&WALLS_COMP))
                 .read("body_depth", buffer(plan))
                 .read("splash_depth", m.depth)
-                .write("front_tiles", m.out)
+                .write("walls", m.out)
         },
         "and b is not",
     );
     // Without layers, where the shader has an array.
     refused(
         |plan, m| {
-            both(Call::compute(&TILES_COMP))
+            both(Call::compute(&WALLS_COMP))
                 .read("body_depth", plan.flat("flat", Format::R32_SFLOAT))
                 .read("splash_depth", m.depth)
-                .write("front_tiles", m.out)
+                .write("walls", m.out)
         },
         "and flat is not",
     );
     refused(
         |_, m| {
-            both(Call::compute(&TILES_COMP))
+            both(Call::compute(&WALLS_COMP))
                 .write("body_depth", m.depth)
                 .read("splash_depth", m.depth)
-                .write("front_tiles", m.out)
+                .write("walls", m.out)
         },
         "sampled images are read",
     );
@@ -128,12 +128,12 @@ fn kinds_have_to_be_the_shaders() {
 #[test]
 fn storage_images_have_the_shaders_format() {
     let other = |plan: &mut Plan| plan.map("wide", Format::R32G32_SFLOAT, 2);
-    refused(|plan, m| reading(m).write("front_tiles", other(plan)), "and wide is not");
+    refused(|plan, m| reading(m).write("walls", other(plan)), "and wide is not");
 }
 
 #[test]
 fn a_step_does_not_read_what_it_writes() {
-    refused(|_, m| reading(m).write("front_tiles", m.depth), "depth is written in one step and used in it once more");
+    refused(|_, m| reading(m).write("walls", m.depth), "depth is written in one step and used in it once more");
 }
 
 #[test]

@@ -12,6 +12,10 @@ pub struct Surface {
     pub depth: f64,
     /// Outward unit normal in eye space.
     pub normal: DVec3,
+    /// Depth at which the ray leaves the same particle.
+    pub far: f64,
+    /// Outward unit normal there.
+    pub far_normal: DVec3,
     /// Index of the particle it belongs to.
     pub particle: usize,
     /// How far the next surface of the same layer lies behind (in front of, for backs) this one.
@@ -26,6 +30,8 @@ pub fn splat(frame: &Frame, particles: &[Particle], visible: &[u32], side: u32) 
     let nothing = Surface {
         depth: 0.0,
         normal: DVec3::ZERO,
+        far: 0.0,
+        far_normal: DVec3::ZERO,
         particle: usize::MAX,
         margin: f64::INFINITY,
         silhouette: f64::INFINITY,
@@ -57,9 +63,9 @@ pub fn splat(frame: &Frame, particles: &[Particle], visible: &[u32], side: u32) 
                     (false, false) => seen - at.depth,
                 };
                 if gain > 0.0 {
-                    let (normal, margin) = (q.normal(v * depth), gain);
+                    let (normal, far_normal, silhouette) = (q.normal(v * depth), q.normal(v * leave), at.silhouette);
                     let depth = if depth < near { -near } else { depth };
-                    *at = Surface { depth, normal, particle: index, margin, silhouette: at.silhouette };
+                    *at = Surface { depth, normal, far: leave, far_normal, particle: index, margin: gain, silhouette };
                 } else {
                     at.margin = at.margin.min(-gain);
                 }

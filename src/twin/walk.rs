@@ -62,10 +62,7 @@ impl Liquid {
     fn leave(self, maps: &Maps, ray: &Ray) -> Result<Wall, End> {
         match self {
             Liquid::Body => maps.leave_body(ray),
-            Liquid::Ball(ball) => {
-                let t = ball.leave(ray);
-                Ok(Wall { inside: t, outside: t, normal: ball.normal(ray.at(t)), side_wall: false })
-            }
+            Liquid::Ball(ball) => Ok(ball.wall(ray, ball.leave(ray))),
         }
     }
 
@@ -109,18 +106,28 @@ impl Walker<'_> {
     }
 
     /// Enters, eq. (6): F b(r) stays outside, 1 - F goes on along t.
-    fn enter(&mut self, normal: DVec3) {
-        let n = if self.dir.dot(normal) > 0.0 { -normal } else { normal };
+    fn enter(&mut self, normal: DVec3, side_wall: bool) {
+        let n = match (self.dir.dot(normal) > 0.0, side_wall) {
+            (false, _) => normal,
+            (true, false) => -normal,
+            (true, true) => -self.dir,
+        };
         let bent = bend(self.dir, n, 1.0 / self.maps.frame.ior).expect("there is no critical angle into water");
         self.split(-self.dir.dot(n), -bent.dot(n), mirror(self.dir, n));
         self.dir = bent;
         self.hits += 1;
+        self.side_wall |= side_wall;
     }
 
     /// Meets a wall from inside: whether the ray leaves, or is reflected.
-    fn leave(&mut self, normal: DVec3) -> bool {
-        let n = if self.dir.dot(normal) < 0.0 { -normal } else { normal };
+    fn leave(&mut self, normal: DVec3, side_wall: bool) -> bool {
+        let n = match (self.dir.dot(normal) < 0.0, side_wall) {
+            (false, _) => normal,
+            (true, false) => -normal,
+            (true, true) => self.dir,
+        };
         self.hits += 1;
+        self.side_wall |= side_wall;
         let mirrored = mirror(self.dir, n);
         if let Some(bent) = bend(self.dir, -n, self.maps.frame.ior) {
             // Eqs. (7) and (8).
@@ -139,8 +146,8 @@ impl Walker<'_> {
         loop {
             let ray = Ray::new(maps.frame, self.x, self.dir);
             let found = liquid.leave(maps, &ray);
-            let handed = found.ok().and_then(|wall| liquid.handed_over(maps, ray.at(wall.inside)));
-            let end = found.map_or_else(|end| end.t, |wall| wall.inside);
+            let handed = found.ok().and_then(|wall| liquid.handed_over(maps, ray.at(wall.t)));
+            let end = found.map_or_else(|end| end.t, |wall| wall.t);
             // Liquid that ends just before the scene touches it.
             let gap = match found {
                 Ok(wall) if handed.is_none() => {
@@ -163,11 +170,11 @@ impl Walker<'_> {
                 liquid = other;
                 continue;
             }
-            self.side_wall |= wall.side_wall;
-            if self.leave(wall.normal) {
+            if self.leave(wall.normal, wall.side_wall) {
                 self.x = ray.at(wall.outside);
                 return Ok(());
             }
+            self.x = ray.at(wall.inside);
             if self.bounces == self.settings.internal_reflections {
                 return Err(Some(OUTCOME_REFLECTION_LIMIT));
             }
@@ -180,17 +187,18 @@ impl Walker<'_> {
         let maps = self.maps;
         let ray = Ray::new(maps.frame, self.x, self.dir);
         let entry = maps.enter(&ray).map_err(|end| end.view.then_some(OUTCOME_LEFT_VIEW))?;
-        let (liquid, t, normal, side_wall) = match entry {
-            Entry::Body(wall) => (Liquid::Body, wall.inside, wall.normal, wall.side_wall),
-            Entry::Ball(ball, t) => (Liquid::Ball(ball), t, ball.normal(ray.at(t)), false),
+        let (liquid, wall) = match entry {
+            Entry::Body(wall) => (Liquid::Body, wall),
+            Entry::Ball(ball, t) => (Liquid::Ball(ball), ball.wall(&ray, t)),
         };
-        if let Some((_, pixel)) = maps.meets_scene(&ray.up_to(t)) {
+        if let Some((_, pixel)) = maps.meets_scene(&ray.up_to(wall.t)) {
             self.on_scene = Some(pixel);
             return Err(Some(OUTCOME_SCENE));
         }
-        self.x = ray.at(t);
-        self.side_wall |= side_wall;
-        self.enter(normal);
+        // What is reflected starts on the wall.
+        self.x = ray.at(wall.t);
+        self.enter(wall.normal, wall.side_wall);
+        self.x = ray.at(wall.inside);
         Ok(liquid)
     }
 
@@ -269,7 +277,7 @@ pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize;
         on_scene: None,
     };
     if bent {
-        walker.enter(maps.normal(first.class(), SIDE_FRONT, pixel));
+        walker.enter(maps.normal(first.class(), SIDE_FRONT, pixel), false);
     }
     let (second, stopped) = if single { (None, None) } else { walker.volumes(first) };
     let Walker { x, dir, color, light, hits, length, side_wall, on_scene, .. } = walker;

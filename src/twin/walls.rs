@@ -2,9 +2,10 @@
 //! are (docs/methods.md, "Walls along a ray"). In place of cells, a dense march: slow, but the first wall it meets is the first
 //! wall there is.
 
-use super::{background::Scene, normal::decode_normal, quadric::pixel_ray};
+use super::{background::Scene, normal::decode_normal, quadric::pixel_ray, watch::Watch};
 use crate::shader::{
-    ACCEPTED, ACCEPTED_PIXELS, CLASS_BODY, CLASS_SPLASH, Frame, JUMP, SIDE_BACK, SIDE_FRONT, START_PIXELS, STEEP,
+    ACCEPTED, ACCEPTED_PIXELS, BOX_MARGIN, CLASS_BODY, CLASS_SPLASH, Frame, JUMP, SIDE_BACK, SIDE_FRONT, SIDE_NUDGE,
+    STEEP,
 };
 use glam::{DVec2, DVec3, Mat3, Vec4Swizzles};
 
@@ -58,11 +59,13 @@ const STEP_DEPTH: f64 = 0.125;
 /// Where a ray passes from one side of the body's wall to the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall {
-    /// The wall on the ray, still inside the body.
+    /// The wall on the ray.
+    pub t: f64,
+    /// Where a ray goes on that stays inside, or comes in.
     pub inside: f64,
-    /// The same, and just outside.
+    /// Where a ray goes on that stays outside, or goes out.
     pub outside: f64,
-    /// Of unit length; which way it points is left to the ray.
+    /// Of unit length, outward.
     pub normal: DVec3,
     /// Whether a map ends or jumps there.
     pub side_wall: bool,
@@ -113,6 +116,11 @@ impl Ball {
     /// Whether a point lies inside.
     pub fn holds(&self, x: DVec3) -> bool {
         x.distance(self.center) < self.radius
+    }
+
+    /// The sphere as a ray meets it at t.
+    pub(super) fn wall(&self, ray: &Ray, t: f64) -> Wall {
+        Wall { t, inside: t, outside: t, normal: self.normal(ray.at(t)), side_wall: false }
     }
 
     /// Outward normal at a point of the sphere.
@@ -205,7 +213,7 @@ impl Maps<'_> {
     }
 
     /// g at a point.
-    fn g(&self, x: DVec3) -> f64 {
+    pub(super) fn g(&self, x: DVec3) -> f64 {
         self.terms(x).map_or(f64::INFINITY, |[front, back]| front.max(back))
     }
 
@@ -224,33 +232,53 @@ impl Maps<'_> {
         sum.normalize()
     }
 
-    /// Normal of a side wall, from the pixel that holds the last point inside; `outside` are the terms just beyond.
-    fn side_normal(&self, ray: &Ray, x: DVec3, outside: Option<Terms>) -> DVec3 {
-        let pixel = self.pixel_of(x);
-        let [front, back] = [SIDE_FRONT, SIDE_BACK].map(|side| self.normal(CLASS_BODY, side, pixel));
-        let sight = x.normalize();
-        let across = outside.map(|[before, behind]| {
-            let n = if before > behind { front } else { back };
-            n - n.dot(sight) * sight
+    /// Where on the screen the body ends around a pixel at a depth; the way `along` where that says little.
+    fn ends_around(&self, pixel: [usize; 2], depth: f64, along: DVec2) -> DVec2 {
+        let center = DVec2::new(pixel[0] as f64, pixel[1] as f64);
+        let steps = (-1..=1).flat_map(|y| (-1..=1).map(move |x| DVec2::new(f64::from(x), f64::from(y))));
+        let without = steps.filter(|step| *step != DVec2::ZERO).filter(|step| {
+            let interval = self.interval(self.clamped(center + *step));
+            interval.is_none_or(|[front, back]| depth < front || depth > back)
         });
-        // Packed normals of flat sheets cancel up to their last bits. What remains of neither lets the ray pass unbent.
-        let some = |n: &DVec3| n.length() > VANISHED;
-        across.filter(some).or(Some(front + back).filter(some)).map_or(ray.dir, DVec3::normalize)
+        let sum: DVec2 = without.map(|step| step / step.length_squared()).sum();
+        if sum.length() > 0.5 { sum } else { along }
+    }
+
+    /// Normal of a side wall, from the points on either side of it; `outwards` is the way of the ray there on the screen.
+    fn side_normal(&self, inside: DVec3, outside: DVec3, outwards: DVec2) -> DVec3 {
+        let pixel = self.pixel_of(inside);
+        let [front, back] = [SIDE_FRONT, SIDE_BACK].map(|side| self.normal(CLASS_BODY, side, pixel));
+        // The plane through the eye along the edge.
+        let c = self.ends_around(pixel, -inside.z, outwards) * self.frame.pixel_scale.as_dvec2();
+        let edge = c.extend(c.dot(inside.truncate()) / -inside.z).normalize();
+        let sight = inside.normalize();
+        let limb = match self.terms(outside) {
+            None => 0.5 * (front + back),
+            Some([before, behind]) if before > behind => front,
+            Some(_) => back,
+        };
+        let limb = limb - limb.dot(sight) * sight;
+        let known = if limb.dot(edge) > 0.0 { limb.length_squared().min(1.0) } else { 0.0 };
+        edge.lerp(limb, known).normalize()
     }
 
     /// The wall between the ends of a bracket, one of them inside and one outside.
-    fn wall(&self, ray: &Ray, inside: f64, outside: f64) -> Wall {
+    pub(super) fn wall(&self, ray: &Ray, inside: f64, outside: f64) -> Wall {
         for t in [inside, outside] {
             let x = ray.at(t);
             if let Some([front, back]) = self.terms(x)
                 && front.max(back).abs() <= Tolerance::at(self.frame, -x.z).accepted
             {
                 let normal = self.surface_normal(if front > back { SIDE_FRONT } else { SIDE_BACK }, x);
-                return Wall { inside, outside, normal, side_wall: false };
+                return Wall { t: inside, inside, outside, normal, side_wall: false };
             }
         }
-        let normal = self.side_normal(ray, ray.at(inside), self.terms(ray.at(outside)));
-        Wall { inside, outside, normal, side_wall: true }
+        let leaves = (outside - inside).signum();
+        let normal = self.side_normal(ray.at(inside), ray.at(outside), leaves * self.on_screen(ray, inside));
+        // Off the border between two pixels.
+        let nudge = leaves * f64::from(SIDE_NUDGE) / self.on_screen(ray, inside).length().max(1e-12);
+        let beside = |t: f64| t.clamp(0.0, self.end(ray).t);
+        Wall { t: inside, inside: beside(inside - nudge), outside: beside(outside + nudge), normal, side_wall: true }
     }
 
     /// Where a ray that starts in the body leaves it.
@@ -282,7 +310,7 @@ impl Maps<'_> {
             }
             if let Some(wall) = watch.passes(self, t) {
                 return Ok(match ball {
-                    Some((ball, at)) if at < wall.inside => Entry::Ball(ball, at),
+                    Some((ball, at)) if at < wall.t => Entry::Ball(ball, at),
                     _ => Entry::Body(wall),
                 });
             }
@@ -345,11 +373,14 @@ impl Maps<'_> {
 
     /// An eighth of a pixel on, or the ray's end.
     pub(super) fn next_on_screen(&self, ray: &Ray, t: f64) -> f64 {
+        ray.box_end.min(t + STEP_PIXELS / self.on_screen(ray, t).length().max(1e-12))
+    }
+
+    /// d pixel / dt at a point of a ray.
+    fn on_screen(&self, ray: &Ray, t: f64) -> DVec2 {
         let d = -ray.at(t).z;
         let lateral = ray.dir.truncate() * -ray.origin.z + ray.origin.truncate() * ray.dir.z;
-        // |d pixel / dt| = |a lateral| / d²
-        let speed = (lateral * self.frame.pixel_scale.as_dvec2()).length() / (d * d);
-        ray.box_end.min(t + STEP_PIXELS / speed.max(1e-12))
+        lateral * self.frame.pixel_scale.as_dvec2() / (d * d)
     }
 
     pub(super) fn in_view(&self, x: DVec3) -> bool {
@@ -380,68 +411,6 @@ impl Maps<'_> {
     }
 }
 
-/// Normals, or what is left of them, no longer than this say nothing.
-const VANISHED: f64 = 1e-3;
-
-/// The verdict on a ray, sample by sample: on which side of the body's wall it is.
-struct Watch<'a> {
-    ray: &'a Ray,
-    /// Whether its own side, on which it starts, is the inside.
-    inside: bool,
-    /// The last sample that counted as on its own side.
-    last: f64,
-    /// The last sample that was.
-    own: Option<f64>,
-}
-
-impl Watch<'_> {
-    fn new(ray: &Ray, inside: bool) -> Watch<'_> {
-        Watch { ray, inside, last: 0.0, own: None }
-    }
-
-    /// g, negative on the ray's own side.
-    fn beyond(&self, maps: &Maps, t: f64) -> f64 {
-        let g = maps.g(self.ray.at(t));
-        if self.inside { g } else { -g }
-    }
-
-    /// Whether the ray counts as on its own side at t. It starts on a wall, which may lie a little off.
-    fn stays(&self, maps: &Maps, t: f64) -> bool {
-        let (g, x) = (self.beyond(maps, t), self.ray.at(t));
-        let starting = maps.project(x).distance(maps.project(self.ray.origin)) <= f64::from(START_PIXELS);
-        g < 0.0 || (starting && g <= Tolerance::at(maps.frame, -x.z).accepted)
-    }
-
-    /// The wall, if the ray has passed one at this sample.
-    fn passes(&mut self, maps: &Maps, t: f64) -> Option<Wall> {
-        if self.stays(maps, t) {
-            self.last = t;
-            if self.beyond(maps, t) < 0.0 {
-                self.own = Some(t);
-            }
-            return None;
-        }
-        Some(self.passed(maps, t).unwrap_or_else(|| {
-            // It never was on its own side: the wall is where that is no longer overlooked.
-            let (own, other) = bisect(self.last, t, |t| !self.stays(maps, t));
-            self.between(maps, own, other)
-        }))
-    }
-
-    /// The wall, if the ray is on the other side at t and was on its own before: where g passes through zero, however late it
-    /// is noticed so near the start.
-    fn passed(&self, maps: &Maps, t: f64) -> Option<Wall> {
-        let own = self.own.filter(|_| self.beyond(maps, t) >= 0.0)?;
-        let (own, other) = bisect(own, t, |t| self.beyond(maps, t) >= 0.0);
-        Some(self.between(maps, own, other))
-    }
-
-    fn between(&self, maps: &Maps, own: f64, other: f64) -> Wall {
-        let (inside, outside) = if self.inside { (own, other) } else { (other, own) };
-        maps.wall(self.ray, inside, outside)
-    }
-}
-
 /// Narrows the bracket from a to b in which something becomes true.
 pub(super) fn bisect(mut a: f64, mut b: f64, yet: impl Fn(f64) -> bool) -> (f64, f64) {
     for _ in 0..60 {
@@ -463,12 +432,13 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// A ray, and where it leaves the box around the liquid.
+    /// A ray, and where it leaves the box around the liquid, beyond which smoothing may move surfaces a little.
     pub fn new(frame: &Frame, origin: DVec3, dir: DVec3) -> Ray {
         let to_world = Mat3::from_mat4(frame.view).as_dmat3().transpose();
         let o = to_world * (origin - frame.view.w_axis.xyz().as_dvec3());
         let w = to_world * dir;
-        let (low, high) = (frame.bounds_min.as_dvec3(), frame.bounds_max.as_dvec3());
+        let margin = f64::from(BOX_MARGIN);
+        let (low, high) = (frame.bounds_min.as_dvec3() - margin, frame.bounds_max.as_dvec3() + margin);
         let ends = (0..3).filter(|k| w[*k] != 0.0).map(|k| (if w[k] > 0.0 { high[k] } else { low[k] } - o[k]) / w[k]);
         Ray { origin, dir, box_end: ends.fold(f64::INFINITY, f64::min).max(0.0) }
     }

@@ -201,7 +201,7 @@ fn every_method_is_dumped() {
         (&["--method", "cords08", "--spray", "0.8"][..], &["speed", "body_front_missing_silhouette"][..]),
         (&["--method", "imai14"], &["nearest_and_farthest", "body_back_depth_last_step"]),
         (&["--method", "green10"], &["thickness", "body_front_depth_last_step"]),
-        (&[], &["front_tiles_nearest", "front_tiles_farthest", "body_front_depth_last_step", "body_back_depth"]),
+        (&[], &["walls", "body_front_depth_last_step", "body_back_depth"]),
     ] {
         run.render(&[&[&moving, "--radius", "0.05", "--dump", "d"], args].concat());
         let mut files = listing(&run.path("d"));

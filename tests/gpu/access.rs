@@ -24,9 +24,9 @@ const READS: [(&str, &str, S, S); 15] = [
     ("normals", "body depth (smoothed, odd)", S::COMPUTE_SHADER, S::COMPUTE_SHADER),
     ("walk", "body depth (smoothed, odd)", S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
     ("walk", "body normal (smoothed)", S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
-    ("tiles", "splash depth", S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),
+    ("walls", "splash depth", S::COLOR_ATTACHMENT_OUTPUT, S::COMPUTE_SHADER),
     ("walk", "splash depth", S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
-    ("walk", "front depth tiles", S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
+    ("walk", "walls", S::COMPUTE_SHADER, S::FRAGMENT_SHADER),
     ("walk", "splash normal", S::COLOR_ATTACHMENT_OUTPUT, S::FRAGMENT_SHADER),
 ];
 

@@ -27,5 +27,5 @@ mod space;
 mod splat;
 mod spray;
 mod support;
-mod tiles;
 mod walk;
+mod walls;

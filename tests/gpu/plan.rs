@@ -129,10 +129,7 @@ fn memory_follows_from_the_method() {
             let (odd, even) = ("body depth (smoothed, odd)", "body depth (smoothed, even)");
             assert!(one.contains(&odd) && !one.contains(&even), "{one:?}");
             assert!(two.contains(&odd) && two.contains(&even), "{two:?}");
-            assert!(
-                two.contains(&"front depth tiles")
-                    && !names(PlaneFit::default().into(), 2).contains(&"front depth tiles")
-            );
+            assert!(two.contains(&"walls") && !names(PlaneFit::default().into(), 1).contains(&"walls"));
             let binomial = names(Smooth::named("binomial").expect("a filter"), 4);
             assert!(binomial.contains(&"missing silhouette") && !two.contains(&"missing silhouette"), "{binomial:?}");
         });

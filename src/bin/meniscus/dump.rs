@@ -6,7 +6,7 @@ use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     host::Session,
     inspect::{self, Spec, Walk},
-    shader::{ACCEPTED, ACCEPTED_PIXELS, WALL_TILE, JUMP, SIDE_BACK, SIDE_FRONT, STEEP},
+    shader::{ACCEPTED, ACCEPTED_PIXELS, JUMP, SIDE_BACK, SIDE_FRONT, STEEP},
     space::Space,
     twin::normal::decode_normal,
 };
@@ -49,11 +49,10 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     if let Some(words) = session.words("nearest and farthest depth", 0)? {
         out.array("nearest_and_farthest", 2, words.into_iter().map(|w| f32::from_bits(w) * radius))?;
     }
-    for (end, layer) in [("nearest", 0), ("farthest", 1)] {
-        if let Some(words) = session.words("front depth tiles", layer)? {
-            let depths = words.into_iter().map(|w| f32::from_bits(w) * radius);
-            out.array_of(&format!("front_tiles_{end}"), size_of_map(session, "front depth tiles"), 1, depths)?;
-        }
+    // Of pixels, and below those of tiles.
+    if let Some(words) = session.words("walls", 0)? {
+        let texels = 4 * out.size[0] as usize * out.size[1] as usize;
+        out.array("walls", 4, words.into_iter().take(texels).map(|w| f32::from_bits(w) * radius))?;
     }
     if let Some(words) = session.words("thickness", 0)? {
         out.array("thickness", 1, words.into_iter().map(|w| f32::from_bits(w) * radius))?;
@@ -234,8 +233,8 @@ pub fn frame(job: &Job) -> Value {
         "smoothing": "`_raw`: before; `_last_step`: what the last step read; missing_silhouette: how much the row pass of the \
                       last iteration missed",
         "nearest_and_farthest": "before they are parted: the nearest front, negative (-inf: none), and the farthest back",
-        "front_tiles": format!("range of all front depths in each tile of {WALL_TILE} x {WALL_TILE} pixels; in an empty one \
-                               the nearest is beyond the farthest"),
+        "walls": "depths at which the pixel's ray enters and leaves the body, then those of the splash in front, world units; \
+                  where there is none the first is beyond the second",
         "normals": "eye space, outward: fronts towards the viewer, backs away from it",
         "particle_classes": {"0": "splash", "1": "body"},
         "command": options::command(),
