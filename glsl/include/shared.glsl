@@ -134,7 +134,7 @@
 // Samples of g that look for a change of its sign, at most.
 #define CROSS_STEPS 32
 // ... and that narrow it.
-#define NARROW_STEPS 14
+#define NARROW_STEPS 24
 // How often the two take turns, at most.
 #define WALL_TRIES 16
 // Pixels after its start on a wall within which a ray still counts as on its own side.
@@ -151,8 +151,10 @@
 #define JUMP 2.0
 // Tangent of the angle against the view plane (81 degrees) of the steepest surface that counts as continuous.
 #define STEEP 6.0
-// A root is found where |g| is no larger than this, in particle radii.
-#define CONVERGED 0.001
+// A root is found where |g| is no larger than this, in particle radii,
+#define CONVERGED 0.0002
+// or than this fraction of the depth, where float32 has no finer steps.
+#define CONVERGED_DEPTH 0.000001
 
 // A ray meets the host's scene between two pixels where it lies no further behind the second one's depth than this fraction of
 // it: a floor seen at 5 degrees falls off so much from row to row in a picture of 768 rows.

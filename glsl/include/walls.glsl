@@ -34,6 +34,7 @@ struct Body {
     float spread; // of the depths that were interpolated; 0 where they were not
     int side;     // whose term of g is the larger
     bvec2 whole;  // front, back: whether they were interpolated
+    vec2 terms;   // of g: F - d, d - B
 };
 
 Body body_at(vec2 position, float d) {
@@ -52,14 +53,15 @@ Body body_at(vec2 position, float d) {
     float back = whole.y ? bilinear(vec4(a.y, b.y, c.y, e.y), p.weight, low.y) : own.y;
     float before = front - d, behind = d - back;
     float spread = max(whole.x ? high.x - low.x : 0.0, whole.y ? high.y - low.y : 0.0);
-    return Body(own.y > 0.0 ? max(before, behind) : HOLE, spread, before > behind ? SIDE_FRONT : SIDE_BACK, whole);
+    vec2 terms = own.y > 0.0 ? vec2(before, behind) : vec2(HOLE);
+    return Body(max(terms.x, terms.y), spread, before > behind ? SIDE_FRONT : SIDE_BACK, whole, terms);
 }
 
 vec3 body_normal_of(int side, ivec2 pixel) { return decode_normal(texelFetch(body_normal, ivec3(pixel, side), 0).x); }
 
-// With the weights of the depth there.
-vec3 body_normal_at(int side, bool whole, vec2 position) {
-    if (!whole) return body_normal_of(side, nearest(position));
+// With the weights of the depth there; that of `pixel` where depths were not interpolated.
+vec3 body_normal_at(int side, bool whole, vec2 position, ivec2 pixel) {
+    if (!whole) return body_normal_of(side, pixel);
     Footprint p = footprint(position);
     vec3 upper = mix(body_normal_of(side, p.lo), body_normal_of(side, ivec2(p.hi.x, p.lo.y)), p.weight.x);
     vec3 lower = mix(body_normal_of(side, ivec2(p.lo.x, p.hi.y)), body_normal_of(side, p.hi), p.weight.x);
@@ -99,6 +101,8 @@ struct Ball {
 Ball ball_at(ivec2 pixel, vec2 depths) {
     vec3 v = view_ray(vec2(pixel) + 0.5), n = decode_normal(texelFetch(splash_normal, ivec3(pixel, SIDE_FRONT), 0).x);
     float radius = (depths.y - depths.x) * dot(v, v) / max(-2.0 * dot(n, v), 1e-6);
+    // Around the near plane it is the far normal.
+    if (dot(n, v) >= 0.0) return Ball(depths.y * v - n, 1.0);
     return Ball(depths.x * v - radius * n, radius);
 }
 
@@ -173,15 +177,17 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
     float sign_of_side = inside ? 1.0 : -1.0, pixel = 1.0 / max(ray.span, 1e-6), start = START_PIXELS * pixel;
     // f = g inside, -g outside: negative on the ray's own side.
     float a = 0.0, fa = -1e-6, b = 0.0, fb = 0.0, at = min(max(s, 0.5 * pixel), 1.0), back = pixel, kept = 0.0;
-    Body before = Body(HOLE, 0.0, SIDE_FRONT, bvec2(false)), after = before; // at a and b
-    bool known = s <= start, bracketed = false, done = false, found = false;
+    Body before = body_at(line.start, depth_at(line, 0.0)), after = before; // at a and b
+    int side = SIDE_FRONT; // of the outer end of the bracket: whose term of g is followed
+    bool known = s <= start, own = false, bracketed = false, done = false, found = false;
     vec2 along = line.end - line.start;
     // A bracket that is found late is narrowed all the same.
     for (int i = 0, last = CROSS_STEPS; i < last && !done; ++i) {
         float d = depth_at(line, at);
         Body body = body_at(line.start + at * along, d);
-        float f = sign_of_side * body.g;
-        if (at < start && f <= accepted_at(d)) f = min(f, -1e-6);
+        float f = sign_of_side * (bracketed ? body.terms[side] : body.g);
+        bool overlooked = !bracketed && at < start && f >= 0.0 && f <= accepted_at(d);
+        if (overlooked) f = -1e-6;
         if (bracketed) {
             if (f < 0.0) {
                 a = at;
@@ -196,11 +202,15 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
                 if (kept > 0.0) fa *= 0.5;
                 kept = 1.0;
             }
-        } else if (f < 0.0) {
+        } else if (f < 0.0 && !(!inside && known && before.g < HOLE && body.g < HOLE && body.side != before.side)) {
             if (known && at >= alarmed && -f > body.spread && -f < HOLE || at >= 1.0 || (f <= -HOLE && at >= alarmed)) done = true;
-            a = at;
-            fa = f;
-            before = body;
+            // Where it was on its side before, that is where it will have crossed.
+            if (!overlooked || !own) {
+                a = at;
+                fa = f;
+                before = body;
+            }
+            own = own || !overlooked;
             known = true;
         } else {
             b = at;
@@ -208,12 +218,16 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
             after = body;
             bracketed = known;
             if (known) last = i + NARROW_STEPS;
+            side = inside ? after.side : before.side;
+            fa = min(sign_of_side * before.terms[side], -1e-6);
+            fb = max(sign_of_side * after.terms[side], 1e-6);
+            f = fb;
         }
         if (bracketed) {
             found = true;
             bool level = abs(fa) >= HOLE || abs(fb) >= HOLE || (i & 1) == 1;
             at = level ? 0.5 * (a + b) : b - fb * (b - a) / (fb - fa);
-            done = done || abs(f) <= CONVERGED || b - a <= 1e-3 * pixel;
+            done = done || abs(f) <= max(CONVERGED, CONVERGED_DEPTH * d) || b - a <= min(1e-3 * pixel, 1e-6);
         } else if (known) {
             s = at;
             at = min(at + pixel, 1.0);
@@ -243,10 +257,11 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
     }
     bool at_inner = abs(inner.g) <= accepted;
     bool surface = at_inner || abs(outer.g) <= accepted;
-    // The line through both ends, if both are near the surface; else the end that is, or the middle.
-    bool near_a = abs(before.g) <= accepted, near_b = abs(after.g) <= accepted;
+    // The line through both ends, if one is near the surface; else the end that is, or the middle.
+    float ga = before.terms[side], gb = after.terms[side];
+    bool near_a = abs(ga) <= accepted, near_b = abs(gb) <= accepted;
     float hit = near_a == near_b ? 0.5 * (a + b) : (near_a ? a : b);
-    if (near_a && near_b && before.g != after.g) hit = clamp(b - after.g * (b - a) / (after.g - before.g), a, b);
+    if ((near_a || near_b) && max(abs(ga), abs(gb)) < HOLE && ga != gb) hit = clamp(b - gb * (b - a) / (gb - ga), a, b);
     wall.t = t_at(ray, hit);
     wall.cls = CLASS_BODY;
     wall.side = !surface;
@@ -256,7 +271,9 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
     if (surface) {
         int which = outer.g < HOLE ? outer.side : inner.side;
         bvec2 whole = at_inner ? inner.whole : outer.whole;
-        wall.normal = body_normal_at(which, which == SIDE_FRONT ? whole.x : whole.y, p);
+        // On the border between two pixels, that of the one whose depth is met.
+        vec2 met = at_inner == inside ? pa : pb;
+        wall.normal = body_normal_at(which, which == SIDE_FRONT ? whole.x : whole.y, p, nearest(met));
     } else {
         wall.normal = side_normal(nearest(p_inner), outer, ray.origin + wall.t * ray.dir, inside ? along : -along);
         // Off the border between two pixels, so that a ray goes on from the one on its side.

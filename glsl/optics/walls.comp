@@ -15,9 +15,9 @@ layout(constant_id = 0) const bool HAS_SPLASH = true;
 layout(constant_id = 1) const bool HAS_BODY = true;
 shared uint range[4];
 
-// Front before back; a front around the near plane begins there. Where either is missing, nothing.
+// Front before back; a front around the near plane, or before an eye in the body, begins there. Where either is missing, nothing.
 vec2 interval(float front, float back) {
-    if (front < 0.0) front = frame.near;
+    if (front < 0.0 || frame.eye_inside * front > 0.0) front = frame.near;
     return front > 0.0 && back > 0.0 ? vec2(min(front, back), max(front, back)) : vec2(FARTHEST, -FARTHEST);
 }
 

@@ -9,8 +9,7 @@ use glam::{DMat3, DVec3, Mat3, Vec3};
 use meniscus::{
     Camera, Ellipsoid, Particles, Settings,
     shader::{
-        OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_REFLECTION_LIMIT, OUTCOME_SIDE_WALL, PATTERN_BODY, PATTERN_SPLASH,
-        PATTERN_SPLASH_BODY,
+        OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_REFLECTION_LIMIT, PATTERN_BODY, PATTERN_SPLASH, PATTERN_SPLASH_BODY,
     },
     twin::normal::decode_normal,
 };
@@ -157,10 +156,6 @@ pub fn within(what: &str, driver: &Driver, mut errors: Vec<f64>, at_least: usize
     assert!(p99 <= most && max <= all, "{what} on {}: 99 % within {p99:e}, all within {max:e}", driver.name);
 }
 
-fn found_all(outcome: u32) -> bool {
-    [OUTCOME_HIT, OUTCOME_SIDE_WALL].contains(&outcome)
-}
-
 /// Silhouette, exit direction (two refractions) and path length of a ball, in the middle of the view and off its axis.
 #[test]
 fn a_ball_bends_light_twice() {
@@ -292,12 +287,13 @@ fn a_ball_before_a_slab_is_left_by_its_own_back() {
                 continue;
             }
             assert_eq!(p.pattern, PATTERN_SPLASH_BODY, "{}: pixel {}", driver.name, p.index);
-            assert!(found_all(p.outcome), "{}: pixel {}: outcome {}", driver.name, p.index, p.outcome);
+            assert_eq!(p.outcome, OUTCOME_HIT, "{}: pixel {}", driver.name, p.index);
             angles.push(degrees(p.found, body.dir));
             lengths.push((p.length / (ball.length + body.length) - 1.0).abs());
         }
         within("ball and slab, final direction, degrees", driver, angles, 2000, 0.02, 0.05);
-        within("ball and slab, path length, relative", driver, lengths, 2000, 2e-4, 1e-3);
+        // In the middle a ray stays within one pixel on its way to the slab: there the entry is off by a thirtieth of a radius.
+        within("ball and slab, path length, relative", driver, lengths, 2000, 2e-4, 1e-2);
     });
 }
 
@@ -359,7 +355,8 @@ fn an_eye_inside_looks_out() {
             }
             assert!(limited > 1000, "{}: only {limited} beyond the critical angle", driver.name);
             within("eye inside, direction, degrees", driver, angles, 60_000, 0.02, 0.05);
-            within("eye inside, path length, relative", driver, lengths, 60_000, 2e-5, 2e-4);
+            // Of some radii a root's 2e-4.
+            within("eye inside, path length, relative", driver, lengths, 60_000, 2e-4, 4e-4);
         });
     }
 }
@@ -383,7 +380,7 @@ fn internal_reflections_are_counted() {
                 };
                 reflected += usize::from(exact.reflections > 0 && !exact.limited);
                 limited += usize::from(exact.limited);
-                let right = if exact.limited { p.outcome == OUTCOME_REFLECTION_LIMIT } else { found_all(p.outcome) };
+                let right = p.outcome == if exact.limited { OUTCOME_REFLECTION_LIMIT } else { OUTCOME_HIT };
                 if right {
                     angles.push(degrees(p.found, exact.dir));
                     lengths.push((p.length / exact.length - 1.0).abs());
@@ -392,7 +389,7 @@ fn internal_reflections_are_counted() {
                 }
             }
             assert!(if limit == 0 { limited > 500 } else { reflected > 500 }, "{}: too few", driver.name);
-            // Where a ray grazes the seam between the two maps, it may find neither.
+            // Where a ray grazes the seam between the two maps, it may meet a side wall.
             assert!(wrong * 100 <= angles.len(), "{}: {wrong} outcomes differ", driver.name);
             // A ray guided along the rim leaves where the maps are steep.
             within("lens, direction, degrees", driver, angles, 10_000, 0.3, 2.0);
