@@ -15,9 +15,9 @@ layout(constant_id = 0) const bool HAS_SPLASH = true;
 layout(constant_id = 1) const bool HAS_BODY = true;
 shared uint range[4];
 
-// Front before back; a front around the near plane, or before an eye in the body, begins there. Where either is missing, nothing.
-vec2 interval(float front, float back) {
-    if (front < 0.0 || frame.eye_inside * front > 0.0) front = frame.near;
+// Front before back; a front around the near plane begins there, and any if `around` is 1. Where either is missing, nothing.
+vec2 interval(float front, float back, float around) {
+    if (front < 0.0 || around * front > 0.0) front = frame.near;
     return front > 0.0 && back > 0.0 ? vec2(min(front, back), max(front, back)) : vec2(FARTHEST, -FARTHEST);
 }
 
@@ -40,9 +40,9 @@ void main() {
     if (all(lessThan(pixel, size))) {
         vec2 body = vec2(FARTHEST, -FARTHEST), splash = body;
         if (HAS_BODY)
-            body = interval(texelFetch(body_depth, ivec3(pixel, SIDE_FRONT), 0).x, texelFetch(body_depth, ivec3(pixel, SIDE_BACK), 0).x);
+            body = interval(texelFetch(body_depth, ivec3(pixel, SIDE_FRONT), 0).x, texelFetch(body_depth, ivec3(pixel, SIDE_BACK), 0).x, frame.eye_inside);
         if (HAS_SPLASH)
-            splash = interval(texelFetch(splash_depth, ivec3(pixel, SIDE_FRONT), 0).x, texelFetch(splash_depth, ivec3(pixel, SIDE_BACK), 0).x);
+            splash = interval(texelFetch(splash_depth, ivec3(pixel, SIDE_FRONT), 0).x, texelFetch(splash_depth, ivec3(pixel, SIDE_BACK), 0).x, 0.0);
         imageStore(walls, pixel, vec4(body, splash));
         add(body, splash);
     }
