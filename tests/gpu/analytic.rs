@@ -180,7 +180,7 @@ fn a_ball_bends_light_twice() {
                 }
             }
             // Bilinear normals err by (pixel / radius)^2 / 8, 0.003 degrees, and more towards the rim; packing adds
-            // as much. Lengths: the secant stops within a thousandth of a radius and takes one step more.
+            // as much. Lengths: the search stops within a five-thousandth of a radius and takes one step more.
             within("ball, exit direction, degrees", driver, angles, 4000, 0.03, 0.06);
             within("ball, path length, relative", driver, lengths, 4000, 3e-4, 1e-3);
         });
