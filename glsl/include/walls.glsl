@@ -237,7 +237,6 @@ bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alar
             back *= 2.0;
             if (at <= start) {
                 known = true;
-                a = 0.0;
                 fa = -1e-6;
                 bracketed = true;
                 last = i + NARROW_STEPS;

@@ -158,7 +158,7 @@ bool go_on(inout Walk w, out Wall wall) {
             if (!inside && outcome == OUTCOME_HIT) found = OUTCOME_NO_LIQUID;
         }
     }
-    float t = max(wall.t, 0.0); // the last step onto a wall at hand may round to before it
+    float t = wall.t;
 #ifdef SCENE
     // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
     float t_scene, gap = inside && found == OUTCOME_HIT ? WETTING_GAP / max(abs(dot(w.dir, wall.normal)), WETTING_FLAT) : 0.0;

@@ -9,8 +9,8 @@ use glam::{DVec3, Vec3};
 use meniscus::{
     Background, Equirect, Fresnel, Particles, Settings,
     shader::{
-        OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED, OUTCOME_REFLECTION_LIMIT,
-        OUTCOME_SCENE, OUTCOME_SIDE_WALL, PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH_SPLASH,
+        OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NOT_CONVERGED, OUTCOME_REFLECTION_LIMIT, OUTCOME_SCENE,
+        OUTCOME_SIDE_WALL, PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH_SPLASH,
     },
     twin::{
         background::Scene,
@@ -128,7 +128,7 @@ struct Agreement {
 
 /// Surfaces and balls agree as closely as float32 allows. A side wall's normal is that of one pixel, and which one a ray along
 /// the edge between two meets, rounding decides. A ray that ends without a wall ends where float32 puts the border.
-const AGREEMENTS: [Agreement; 5] = [
+const AGREEMENTS: [Agreement; 4] = [
     Agreement {
         outcome: OUTCOME_HIT,
         both: 0.97,
@@ -152,14 +152,6 @@ const AGREEMENTS: [Agreement; 5] = [
         direction: (0.95, 0.2),
         length: (0.95, 0.25),
         color: 0.99,
-    },
-    Agreement {
-        outcome: OUTCOME_NO_WALL,
-        both: 0.8,
-        pattern: 0.95,
-        direction: (0.8, 0.2),
-        length: (0.8, 0.25),
-        color: 0.9,
     },
     Agreement {
         outcome: OUTCOME_REFLECTION_LIMIT,
