@@ -11,6 +11,7 @@
 #include "shared.glsl"
 #include "frame.glsl"
 #include "depth_map.glsl"
+#include "pixel_groups.glsl"
 // A square tile: of 16 pixels an edge up to REACH 23, of 8 up to 27, so that it fits the guaranteed 16 KiB.
 layout(local_size_x_id = 0, local_size_y_id = 1) in;
 layout(constant_id = 2) const int REACH = 4;
@@ -30,8 +31,8 @@ shared uint occupied;
 
 void main() {
     ivec2 size = ivec2(frame.size);
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 origin = ivec2(gl_WorkGroupID.xy) * TILE - REACH;
+    ivec2 pixel = own_pixel(TILE);
+    ivec2 origin = pixel_group() * TILE - REACH;
     int layer = int(gl_WorkGroupID.z);
     if (gl_LocalInvocationIndex == 0u) occupied = 0u;
     float own = depth_at(pixel, layer);

@@ -16,6 +16,7 @@
 #include "shared.glsl"
 #include "frame.glsl"
 #include "depth_map.glsl"
+#include "pixel_groups.glsl"
 layout(local_size_x = IMAGE_GROUP, local_size_y = IMAGE_GROUP) in;
 layout(constant_id = 0) const int REACH = 32;
 layout(constant_id = 1) const bool SILHOUETTE_MAP = true;
@@ -52,7 +53,7 @@ void add(ivec2 p, int layer, float own, float w) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = own_pixel(IMAGE_GROUP);
     int layer = int(gl_WorkGroupID.z);
     if (any(greaterThanEqual(pixel, ivec2(frame.size)))) return;
     float own = depth_at(pixel, layer);

@@ -20,6 +20,7 @@
 #include "shared.glsl"
 #include "frame.glsl"
 #include "depth_map.glsl"
+#include "pixel_groups.glsl"
 layout(local_size_x = IMAGE_GROUP, local_size_y = IMAGE_GROUP) in;
 layout(constant_id = 0) const uint COUNTERS = 0;
 layout(set = 0, binding = 2, r32f) uniform writeonly image2DArray depth_out;
@@ -38,7 +39,7 @@ vec3 rises(ivec2 pixel, ivec2 step, int layer, float own) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = own_pixel(IMAGE_GROUP);
     int layer = int(gl_WorkGroupID.z);
     if (any(greaterThanEqual(pixel, ivec2(frame.size)))) return;
     float own = depth_at(pixel, layer);

@@ -17,6 +17,7 @@
 #include "shared.glsl"
 #include "frame.glsl"
 #include "depth_map.glsl"
+#include "pixel_groups.glsl"
 layout(local_size_x = IMAGE_GROUP, local_size_y = IMAGE_GROUP) in;
 layout(constant_id = 0) const int REACH = 4;
 layout(constant_id = 1) const bool FIXED = false; // the kernel is REACH pixels, at any depth
@@ -60,7 +61,7 @@ void add(Sample a, Sample b, float w) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = own_pixel(IMAGE_GROUP);
     int layer = int(gl_WorkGroupID.z);
     if (any(greaterThanEqual(pixel, ivec2(frame.size)))) return;
     float own = depth_at(pixel, layer);

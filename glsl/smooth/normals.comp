@@ -8,6 +8,7 @@
 #include "frame.glsl"
 #include "normal.glsl"
 #include "depth_map.glsl"
+#include "pixel_groups.glsl"
 layout(local_size_x = IMAGE_GROUP, local_size_y = IMAGE_GROUP) in;
 #ifdef RAW
 layout(set = 0, binding = 2) uniform utexture2DArray normal_raw; // where differences say nothing
@@ -27,7 +28,7 @@ vec3 tangent(ivec2 pixel, ivec2 step, int layer, float d, vec3 v) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 pixel = own_pixel(IMAGE_GROUP);
     int layer = int(gl_WorkGroupID.z);
     if (any(greaterThanEqual(pixel, ivec2(frame.size)))) return;
     float d = depth_at(pixel, layer);

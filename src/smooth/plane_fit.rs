@@ -47,7 +47,10 @@ parameters! {
     }
 }
 
-/// Edge of a work group: 16 bytes a tile entry have to fit the guaranteed 16 KiB of shared memory.
+/// Pixels of one invocation, one below the other.
+const COLUMN: u32 = 4;
+
+/// Edge of a work group's square of pixels: 16 bytes a tile entry have to fit the guaranteed 16 KiB of shared memory.
 fn tile(reach: u32) -> u32 {
     if reach <= 8 { 16 } else { 8 }
 }
@@ -76,7 +79,7 @@ impl Filter for PlaneFit {
                     "plane_fit_window_clipped",
                 ])
                 .constant("local_size_x", edge)
-                .constant("local_size_y", edge)
+                .constant("local_size_y", edge / COLUMN)
                 .constant("HALF_WINDOW", reach)
                 .constant("EUCLIDEAN", self.weighting == Weighting::Euclidean)
                 .constant("PROJECTED", self.projected)
