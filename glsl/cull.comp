@@ -7,8 +7,9 @@
 #include "quadric.glsl"
 #include "particles.glsl"
 #include "groups.glsl"
+#include "bounds.glsl"
 layout(local_size_x = PARTICLE_GROUP) in;
-layout(set = 0, binding = 4, std430) readonly buffer BoundBlock { uint at[]; } bounds;
+layout(set = 0, binding = 4, std430) readonly buffer BoundBlock { uvec2 at[]; } bounds; // of front and back
 layout(set = 0, binding = 5, std430) buffer VisibleBlock { uint at[]; } visible;
 layout(set = 0, binding = 6, std430) buffer LargeBlock { uint at[]; } large; // particles larger than a point, by class
 layout(constant_id = 0) const bool OCCLUSION_CULLING = true;
@@ -32,19 +33,19 @@ void main() {
     // Few particles are larger than 64 pixels, and those show; walking their pixels would cost more than drawing them.
     if (OCCLUSION_CULLING && cls == CLASS_BODY && verdict != 0u && near > frame.near && all(lessThan(hi - lo, ivec2(LARGE)))) {
         verdict = 0u;
-        uint width = uint(frame.size.x), pixels = width * uint(frame.size.y);
+        uint width = uint(frame.size.x);
+        vec2 scale = frame.pixel_scale, origin = frame.pixel_origin;
         Cast c = cast_of(e);
-        uint front = floatBitsToUint(max(near - DEPTH_ROUNDING, 0.0)), back = floatBitsToUint(far + DEPTH_ROUNDING);
+        uvec2 best = uvec2(front_bound(max(near - DEPTH_ROUNDING, 0.0)), back_bound(far + DEPTH_ROUNDING));
         for (int y = lo.y; y <= hi.y && verdict != wanted; ++y) {
             for (int x = lo.x; x <= hi.x && verdict != wanted; ++x) {
-                uint pixel = uint(y) * width + uint(x);
-                bool may_front = front <= bounds.at[pixel], may_back = BACK_SIDES && back >= bounds.at[pixels + pixel];
-                if (!may_front && !may_back) continue;
+                uvec2 bound = bounds.at[uint(y) * width + uint(x)];
+                bool front = best.x <= bound.x, back = BACK_SIDES && best.y <= bound.y;
                 // Only then the surface itself.
                 float nearer, farther;
-                if (!hits(c, vec2(x, y) + 0.5, 1.0, nearer, farther)) continue;
-                if (may_front && nearer - DEPTH_ROUNDING <= uintBitsToFloat(bounds.at[pixel])) verdict |= VISIBLE_FRONT;
-                if (may_back && farther + DEPTH_ROUNDING >= uintBitsToFloat(bounds.at[pixels + pixel])) verdict |= VISIBLE_BACK;
+                if (!(front || back) || !hits(c, vec3((vec2(x, y) + 0.5 - origin) / scale, -1.0), 1.0, nearer, farther)) continue;
+                if (front && front_bound(max(nearer - DEPTH_ROUNDING, 0.0)) <= bound.x) verdict |= VISIBLE_FRONT;
+                if (back && back_bound(farther + DEPTH_ROUNDING) <= bound.y) verdict |= VISIBLE_BACK;
             }
         }
     }

@@ -1,9 +1,7 @@
-// How deep the body certainly reaches at each pixel: the bounds against which the cull pass tests. The front map is at
-// most the front bound there, the back map at least the back bound.
+// How deep the body certainly reaches at each pixel: the bounds against which the cull pass tests.
 //
 // Every particle is cast at the pixels it covers, where its nearest or farthest depth promises something better than what
-// the pixel has already; which particles come first decides only how often that saves the work. Integer order equals float
-// order for positive floats.
+// the pixel has already; which particles come first decides only how often that saves the work.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
@@ -11,8 +9,10 @@
 #include "quadric.glsl"
 #include "particles.glsl"
 #include "groups.glsl"
+#include "bounds.glsl"
 layout(local_size_x = PARTICLE_GROUP) in;
-layout(set = 0, binding = 4, std430) buffer BoundBlock { uint at[]; } bounds; // front bounds, then back bounds
+layout(set = 0, binding = 4, std430) buffer BoundBlock { uvec2 at[]; } bounds; // of front and back
+layout(constant_id = 0) const bool BACK_SIDES = true;
 
 void main() {
     uint i = invocation();
@@ -27,16 +27,18 @@ void main() {
     // Few particles are larger than 64 pixels, and those hide little that others do not.
     if (any(greaterThanEqual(hi - lo, ivec2(LARGE)))) return;
     Cast c = cast_of(e);
-    uint width = uint(frame.size.x), pixels = width * uint(frame.size.y);
+    uint width = uint(frame.size.x);
+    vec2 scale = frame.pixel_scale, origin = frame.pixel_origin;
+    uvec2 best = uvec2(front_bound(near), back_bound(far));
     for (int y = lo.y; y <= hi.y; ++y) {
         for (int x = lo.x; x <= hi.x; ++x) {
             uint pixel = uint(y) * width + uint(x);
-            bool front = floatBitsToUint(near) < bounds.at[pixel], back = floatBitsToUint(far) > bounds.at[pixels + pixel];
+            uvec2 bound = bounds.at[pixel];
+            bool front = best.x < bound.x, back = BACK_SIDES && best.y < bound.y;
             float nearer, farther;
-            if ((front || back) && hits(c, vec2(x, y) + 0.5, -1.0, nearer, farther)) {
-                if (front) atomicMin(bounds.at[pixel], floatBitsToUint(nearer));
-                if (back) atomicMax(bounds.at[pixels + pixel], floatBitsToUint(farther));
-            }
+            if (!(front || back) || !hits(c, vec3((vec2(x, y) + 0.5 - origin) / scale, -1.0), -1.0, nearer, farther)) continue;
+            if (front_bound(nearer) < bound.x) atomicMin(bounds.at[pixel].x, front_bound(nearer));
+            if (BACK_SIDES && back_bound(farther) < bound.y) atomicMin(bounds.at[pixel].y, back_bound(farther));
         }
     }
 }

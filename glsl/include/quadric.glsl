@@ -98,15 +98,15 @@ float quadratic(Cast c, vec3 v, out vec3 q, out float a, out float b) {
     return b * b - a * (dot(q, gq) - 1.0);
 }
 
-// Depths at which a pixel's ray enters and leaves, as splat.frag has them but for rounding. Where rounding could decide
+// Depths at which a ray (vx, vy, -1) enters and leaves, as splat.frag has them but for rounding. Where rounding could decide
 // whether the ray hits at all, `slack` does: 1 says it does, -1 that it does not.
-bool hits(Cast c, vec2 pixel, float slack, out float nearer, out float farther) {
+bool hits(Cast c, vec3 v, float slack, out float nearer, out float farther) {
     float a, b;
-    vec3 q, v = view_ray(pixel);
+    vec3 q;
     float discriminant = quadratic(c, v, q, a, b);
     discriminant += slack * SILHOUETTE * (b * b + a);
-    float root = sqrt(max(discriminant, 0.0));
-    nearer = c.center.z - (root + b) / a;
-    farther = c.center.z + (root - b) / a;
+    float root = sqrt(max(discriminant, 0.0)), inverse = 1.0 / a;
+    nearer = c.center.z - (root + b) * inverse;
+    farther = c.center.z + (root - b) * inverse;
     return discriminant >= 0.0;
 }

@@ -7,15 +7,16 @@ use crate::{
     shader::OCCLUDE_COMP,
 };
 
-/// Two 32-bit bounds a pixel: nearest front, then farthest back.
+/// Two bounds a pixel, of front and back (`glsl/include/bounds.glsl`).
 pub(crate) fn record(plan: &mut Plan, scene: &Scene, particles: &Arrays) -> Target {
     let [width, height] = plan.size().map(u64::from);
-    let half = 4 * width * height;
-    let bounds = plan.buffer("body depth bounds", 2 * half);
-    // No front is certain: infinitely far. No back: at the eye.
-    plan.fill("occlude", bounds, 0, half, f32::INFINITY.to_bits());
-    plan.fill("occlude", bounds, half, half, 0);
-    let call = particles.read_by(Call::compute(&OCCLUDE_COMP)).update("bounds", bounds);
+    let bytes = 8 * width * height;
+    let bounds = plan.buffer("body depth bounds", bytes);
+    plan.fill("occlude", bounds, 0, bytes, f32::INFINITY.to_bits());
+    let call = particles
+        .read_by(Call::compute(&OCCLUDE_COMP))
+        .update("bounds", bounds)
+        .constant("BACK_SIDES", scene.sides() == 2);
     plan.dispatch("occlude", call, per_particle(scene.count));
     bounds
 }

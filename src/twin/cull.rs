@@ -1,5 +1,6 @@
 //! Twin of `glsl/cull.comp`: which particles can show, and how many of each class.
 
+use super::occlude::Bounds;
 use super::quadric::{PAD, Quadric, pixel_ray, pixels_in, viewport};
 use crate::shader::{DEPTH_ROUNDING, Frame, LARGE, Particle, SILHOUETTE, VISIBLE_BACK, VISIBLE_FRONT};
 
@@ -14,11 +15,9 @@ pub struct Culled {
     pub largest_point: f64,
 }
 
-/// Tests one class against the occlusion bounds, front then back in one slice (floats' bits, as in the GPU's buffer);
-/// `None` where nothing is bounded. `sides` is 1 if only fronts are drawn.
-pub fn cull(frame: &Frame, particles: &[Particle], bounds: Option<&[u32]>, sides: u32) -> Culled {
-    let (width, height, near) = viewport(frame);
-    let pixels = (width * height) as usize;
+/// Tests one class against the occlusion bounds; `None` where nothing is bounded. `sides` is 1 if only fronts are drawn.
+pub fn cull(frame: &Frame, particles: &[Particle], bounds: Option<&Bounds>, sides: u32) -> Culled {
+    let (width, _, near) = viewport(frame);
     let wanted = if sides == 2 { VISIBLE_FRONT | VISIBLE_BACK } else { VISIBLE_FRONT };
     let mut culled = Culled { verdicts: Vec::with_capacity(particles.len()), counts: [0, 0], largest_point: 0.0 };
     let rounding = f64::from(DEPTH_ROUNDING);
@@ -36,16 +35,15 @@ pub fn cull(frame: &Frame, particles: &[Particle], bounds: Option<&[u32]>, sides
             let [nearest, _] = q.reach();
             match bounds {
                 Some(bounds) if small && nearest > near => {
-                    let bound = |i: usize| f64::from(f32::from_bits(bounds[i]));
                     for y in rows[0]..=rows[1] {
                         for x in columns[0]..=columns[1] {
                             let pixel = (y * width + x) as usize;
                             // Rays that only just miss count as hits; comparisons with what is no number fail.
                             let [enter, leave] = q.cast_with_slack(pixel_ray(frame, x, y), f64::from(SILHOUETTE));
-                            if enter - rounding <= bound(pixel) {
+                            if enter - rounding <= bounds.front[pixel] {
                                 verdict |= VISIBLE_FRONT;
                             }
-                            if leave + rounding >= bound(pixels + pixel) {
+                            if leave + rounding >= bounds.back[pixel] {
                                 verdict |= VISIBLE_BACK;
                             }
                         }

@@ -15,6 +15,19 @@ pub struct Bounds {
     pub back: Vec<f64>,
 }
 
+impl Bounds {
+    /// What the GPU's buffer says (`glsl/include/bounds.glsl`).
+    pub fn from_words(words: &[u32]) -> Bounds {
+        let infinite = f32::INFINITY.to_bits();
+        let depth = |bits: u32| f64::from(f32::from_bits(bits));
+        let pairs = words.chunks_exact(2);
+        Bounds {
+            front: pairs.clone().map(|p| depth(p[0])).collect(),
+            back: pairs.map(|p| depth(infinite - p[1])).collect(),
+        }
+    }
+}
+
 /// The bounds from the body's particles, where the rays that only graze one are left out: `slack` (the shader:
 /// `SILHOUETTE`) is how much of the discriminant does not count.
 pub fn occlude(frame: &Frame, body: &[Particle], slack: f64) -> Bounds {

@@ -10,7 +10,7 @@ use meniscus::{
     Camera, Ellipsoid, Particles,
     prepare::{Input, Options, prepare},
     shader::{CLASS_BODY, CLASS_SPLASH, SIDE_BACK, SIDE_FRONT, VISIBLE_BACK, VISIBLE_BODY, VISIBLE_FRONT},
-    twin::{cull::cull, splat::splat},
+    twin::{cull::cull, occlude::Bounds, splat::splat},
 };
 
 /// Counters of what is drawn, by class and side.
@@ -84,9 +84,9 @@ fn check(driver: &Driver, case: &Case, what: &str) -> Shot {
         }
         let label = format!("{}: {what}: class {class}", driver.name);
         // Splash particles are never tested against the body: the two volumes overlap.
-        let bounds = if class == CLASS_BODY { shot.words("body depth bounds", 0) } else { None };
+        let bounds = shot.words("body depth bounds", 0).filter(|_| class == CLASS_BODY).map(|w| Bounds::from_words(&w));
         let sides = if case.settings.walk().refractions == 1 { 1 } else { 2 };
-        let want = cull(&shot.frame, &particles, bounds, sides);
+        let want = cull(&shot.frame, &particles, bounds.as_ref(), sides);
         let got = verdicts(&shot, &case.particles, class);
         // A rectangle's edge on a pixel's centre, or a depth that equals a bound, may go either way in float32.
         let differ = got.iter().zip(&want.verdicts).filter(|(a, b)| a != b).count();

@@ -8,7 +8,7 @@ use crate::{
 use glam::Vec3;
 use meniscus::{
     shader::{CLASS_BODY, DEPTH_ROUNDING, SILHOUETTE},
-    twin::occlude::occlude,
+    twin::occlude::{Bounds, occlude},
 };
 
 /// Depths round in particle radii: G by the ratio of the semi-axes (16 for S), a dozen operations of 6e-8 each, and the
@@ -16,18 +16,15 @@ use meniscus::{
 const ROUNDING: f64 = DEPTH_ROUNDING as f64;
 
 /// Front and back bounds as the GPU has them.
-fn bounds(shot: &Shot) -> (Vec<f64>, Vec<f64>) {
-    let all: Vec<f64> =
-        shot.floats("body depth bounds", 0).expect("there is a body").into_iter().map(f64::from).collect();
-    let half = all.len() / 2;
-    (all[..half].to_vec(), all[half..].to_vec())
+fn bounds(shot: &Shot) -> Bounds {
+    Bounds::from_words(&shot.words("body depth bounds", 0).expect("there is a body"))
 }
 
 /// A pixel may differ only if some ray there nearly grazes a particle: then one that leaves out none of these, or three
 /// times as many, agrees with the GPU.
 fn check(driver: &Driver, case: &Case, what: &str, bounded_at_least: f64) -> Shot {
     let shot = driver.shoot(case);
-    let (front, back) = bounds(&shot);
+    let Bounds { front, back } = bounds(&shot);
     let body = packed(&case.particles, CLASS_BODY);
     let [want, large, small] = [1.0, 0.0, 3.0].map(|share| occlude(&shot.frame, &body, share * f64::from(SILHOUETTE)));
     let rounding = ROUNDING;
@@ -92,7 +89,7 @@ fn the_near_plane_bounds_nothing() {
     only.particles.splash_count = 0;
     each_driver(|driver| {
         check(driver, &crossing, "near plane", 0.1);
-        let (front, back) = bounds(&driver.shoot(&only));
+        let Bounds { front, back } = bounds(&driver.shoot(&only));
         assert!(front.iter().all(|d| *d == f64::INFINITY) && back.iter().all(|d| *d == 0.0), "{}", driver.name);
     });
 }
