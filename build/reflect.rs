@@ -1,7 +1,7 @@
 //! What a SPIR-V module asks of its pipeline: bindings of set 0, specialisation constants and push constants, all by name,
 //! and what it writes to colour attachments.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 pub struct Binding {
     pub index: u32,
@@ -45,6 +45,7 @@ const OP_DECORATE: u32 = 71;
 const OP_MEMBER_DECORATE: u32 = 72;
 const DECORATION_SPEC_ID: u32 = 1;
 const DECORATION_BUILT_IN: u32 = 11;
+const DECORATION_NON_WRITABLE: u32 = 24;
 const DECORATION_LOCATION: u32 = 30;
 const DECORATION_BINDING: u32 = 33;
 const DECORATION_SET: u32 = 34;
@@ -87,7 +88,7 @@ struct Module {
 pub fn interface(words: &[u32]) -> Result<Interface, String> {
     let mut m = Module::default();
     let (mut binding_of, mut spec_of, mut location_of) = (HashMap::new(), HashMap::new(), HashMap::new());
-    let (mut typed, mut fragment) = (HashMap::new(), false);
+    let (mut typed, mut fragment, mut readonly) = (HashMap::new(), false, HashSet::new());
     let (mut variables, mut group_size, mut composites) = (Vec::new(), None, HashMap::new());
     let mut at = 5; // past the header
     while at < words.len() {
@@ -98,6 +99,9 @@ pub fn interface(words: &[u32]) -> Result<Interface, String> {
             OP_MEMBER_NAME => drop(m.member_names.insert((args[0], args[1]), text(&args[2..]))),
             OP_ENTRY_POINT => fragment = args[0] == FRAGMENT,
             OP_DECORATE if args[1] == DECORATION_LOCATION => drop(location_of.insert(args[0], args[2])),
+            OP_DECORATE if args[1] == DECORATION_NON_WRITABLE => {
+                readonly.insert(args[0]);
+            }
             OP_DECORATE if args[1] == DECORATION_BINDING => drop(binding_of.insert(args[0], args[2])),
             OP_DECORATE if args[1] == DECORATION_SPEC_ID => drop(spec_of.insert(args[0], args[2])),
             OP_DECORATE if args[1] == DECORATION_BUILT_IN && args[2] == BUILT_IN_WORKGROUP_SIZE => {
@@ -162,7 +166,12 @@ pub fn interface(words: &[u32]) -> Result<Interface, String> {
         let kind = match (storage, m.types.get(pointee)) {
             (UNIFORM, _) => format!("UniformBuffer({})", m.bytes(*pointee)),
             (STORAGE_BUFFER, _) => "StorageBuffer".into(),
-            (UNIFORM_CONSTANT, Some(Type::Image(kind))) => kind.clone(),
+            (UNIFORM_CONSTANT, Some(Type::Image(kind))) => {
+                if fragment && kind.starts_with("StorageImage") && !readonly.contains(&variable) {
+                    return Err(format!("binding {index}: a fragment shader's storage images are readonly"));
+                }
+                kind.clone()
+            }
             (UNIFORM_CONSTANT, Some(Type::Sampler)) => "Sampler".into(),
             _ => return Err(format!("binding {index} has a type or a storage class that no pass uses")),
         };

@@ -15,6 +15,8 @@ pub enum Access {
     VertexRead,
     /// Sampled read in a fragment shader.
     FragmentRead,
+    /// Storage-image read in a fragment shader: without levels and samplers, which cost llvmpipe most of a texel's price.
+    FragmentStorageRead,
     /// Uniform block, in any shader.
     UniformRead,
     /// Colour attachment.
@@ -41,6 +43,7 @@ impl Access {
             }
             Access::VertexRead => (S::VERTEX_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL),
             Access::FragmentRead => (S::FRAGMENT_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL),
+            Access::FragmentStorageRead => (S::FRAGMENT_SHADER, A::SHADER_READ, L::GENERAL),
             Access::UniformRead => (
                 S::from_raw(S::VERTEX_SHADER.as_raw() | S::FRAGMENT_SHADER.as_raw() | S::COMPUTE_SHADER.as_raw()),
                 A::UNIFORM_READ,
@@ -67,7 +70,7 @@ impl Access {
         use vk::ImageUsageFlags as U;
         match self {
             Access::ComputeRead | Access::FragmentRead => Some(U::SAMPLED),
-            Access::ComputeWrite => Some(U::STORAGE),
+            Access::ComputeWrite | Access::FragmentStorageRead => Some(U::STORAGE),
             Access::ColorAttachment => Some(U::COLOR_ATTACHMENT),
             Access::DepthAttachment => Some(U::DEPTH_STENCIL_ATTACHMENT),
             Access::TransferRead => Some(U::TRANSFER_SRC),
@@ -86,7 +89,7 @@ impl Access {
             Access::IndirectRead => Some(U::INDIRECT_BUFFER),
             Access::TransferRead => Some(U::TRANSFER_SRC),
             Access::TransferWrite => Some(U::TRANSFER_DST),
-            Access::ColorAttachment | Access::DepthAttachment => None,
+            Access::FragmentStorageRead | Access::ColorAttachment | Access::DepthAttachment => None,
         }
     }
 

@@ -7,7 +7,7 @@ float pixel_depth(float d) { return d / max(abs(frame.pixel_scale.x), abs(frame.
 float jump_at(float d) { return max(JUMP, STEEP * pixel_depth(d)); }
 float accepted_at(float d) { return max(ACCEPTED, ACCEPTED_PIXELS * pixel_depth(d)); }
 
-vec4 walls_at(ivec2 pixel) { return texelFetch(walls, pixel, 0); }
+vec4 walls_at(ivec2 pixel) { return imageLoad(walls, pixel); }
 
 // The four pixels around a position, and the weights of the upper corner.
 struct Footprint {

@@ -21,7 +21,7 @@ layout(constant_id = 3) const bool HAS_SPLASH = true;
 layout(constant_id = 4) const bool HAS_BODY = true;
 layout(constant_id = 5) const bool ENCODE_SRGB = false;
 layout(constant_id = 6) const bool HOST_BACKGROUND = false; // only liquid is drawn, over what is there
-layout(set = 0, binding = 1) uniform texture2D walls;            // pixels above, tiles below (walls.comp)
+layout(set = 0, binding = 1, rgba32f) uniform readonly image2D walls; // pixels above, tiles below (walls.comp)
 layout(set = 0, binding = 2) uniform texture2DArray body_depth;
 layout(set = 0, binding = 3) uniform utexture2DArray body_normal;
 layout(set = 0, binding = 4) uniform texture2DArray splash_depth;

@@ -283,15 +283,17 @@ impl Call {
             Kind::StorageImage(..) => (true, true),
             _ => (false, true),
         };
-        if image && (touch == Touch::Read) == storage {
-            return Err(format!("{} is {:?}: sampled images are read, storage images written", b.name, b.kind));
-        }
         if let [vertex, _] = self.recipe.shaders.as_slice() {
-            return match (touch, vertex.bindings.contains(b)) {
-                (Touch::Read, true) => Ok(Access::VertexRead),
-                (Touch::Read, false) => Ok(Access::FragmentRead),
+            return match (touch, vertex.bindings.contains(b), image && storage) {
+                (Touch::Read, true, false) => Ok(Access::VertexRead),
+                (Touch::Read, true, true) => Err(format!("{} is an image that a vertex shader reads", b.name)),
+                (Touch::Read, false, false) => Ok(Access::FragmentRead),
+                (Touch::Read, false, true) => Ok(Access::FragmentStorageRead),
                 _ => Err(format!("{} is written while drawing", b.name)),
             };
+        }
+        if image && (touch == Touch::Read) == storage {
+            return Err(format!("{} is {:?}: sampled images are read, storage images written", b.name, b.kind));
         }
         Ok(match touch {
             Touch::Read => Access::ComputeRead,
