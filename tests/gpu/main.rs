@@ -24,6 +24,7 @@ mod smoke;
 mod smooth;
 mod sort;
 mod space;
+mod speckle;
 mod splat;
 mod spray;
 mod support;
