@@ -119,8 +119,9 @@
 
 // Plane fitting: the least |n.v|, both of unit length, for which eq. (5) of Imai16 is trusted.
 #define FIT_GRAZING_LIMIT 0.01
-// The longest update of a depth that is taken, in sigma.
-#define FIT_UPDATE_LIMIT 4.0
+// The longest update of a depth that is taken, in sigma: a particle radius of the default's. Windows on more than one surface
+// ask for longer ones.
+#define FIT_UPDATE_LIMIT 0.2
 
 // Search for walls along a ray (walls.glsl). How far into the next pixel or tile a position is taken that lies on the edge between
 // two, in pixels.
