@@ -4,9 +4,9 @@ use glam::Vec3;
 use meniscus::particles::Class;
 use meniscus::prepare::density::{lattice, rest_density, spline};
 use meniscus::prepare::ellipsoids::lattice_variance;
-use meniscus::prepare::{DensityField, Options, PrepareError, classify, estimate_radius};
+use meniscus::prepare::{DensityField, Options, PrepareError, classify, estimate_radius, prepare};
 
-use super::{Random, block, run};
+use super::{Random, block, input, run};
 
 #[test]
 fn spline_and_lattice_have_their_closed_values() {
