@@ -21,7 +21,9 @@ layout(set = 0, binding = 6, std430) writeonly buffer DiagonalBlock { float at[]
 layout(set = 0, binding = 7, std430) writeonly buffer MixedBlock { float at[]; } mixed;
 layout(set = 0, binding = 8, std430) buffer CounterBlock { uint at[]; } counters;
 #ifdef KEEP_CLASSES
-layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_classes; // 0 splash, 1 body, by input index
+layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_classes; // 0 splash, 1 body, by id or input index
+layout(set = 0, binding = 11, std430) readonly buffer IdBlock { uint at[]; } ids; // with BY_ID
+layout(constant_id = 3) const bool BY_ID = false;
 #endif
 #ifdef NEIGHBOURS
 layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[]; } neighbours;
@@ -189,7 +191,8 @@ void write(uint k, vec3 center, vec3 diagonal, vec3 mixed_part) {
 
 // What has been counted here, added up once at the end.
 // What becomes of particles; counted as such from COUNTERS on.
-const uint SPLASH = 0u, BODY = 1u, FEW_NEIGHBOURS = 2u, DEGENERATE = 3u, CLAMPED_LONG = 4u, CLAMPED_RATIO = 5u, FATES = 6u;
+const uint SPLASH = 0u, BODY = 1u, FEW_NEIGHBOURS = 2u, DEGENERATE = 3u, CLAMPED_LONG = 4u, CLAMPED_RATIO = 5u,
+           ID_OUT_OF_RANGE = 6u, FATES = 7u;
 uint tally[FATES];
 void note(uint what) { ++tally[what]; }
 
@@ -197,10 +200,14 @@ void note(uint what) { ++tally[what]; }
 bool classify(uint k, float relative) {
     bool body = relative >= prepare.splash_below;
 #ifdef KEEP_CLASSES
-    uint i = input_index(k);
-    uint last = max(last_classes.at[i], 1u - prepare.has_last_classes); // without last classes as if all had been body
-    body = body && (relative >= prepare.keep_below || last != 0u);
-    last_classes.at[i] = body ? 1u : 0u;
+    uint own = input_index(k);
+    if (BY_ID) own = ids.at[prepare.first_id_word + own * prepare.id_word_stride];
+    if (own >= prepare.kept_classes) {
+        note(ID_OUT_OF_RANGE);
+        return body;
+    }
+    body = body && (relative >= prepare.keep_below || last_classes.at[own] != 0u);
+    last_classes.at[own] = body ? 1u : 0u;
 #endif
     return body;
 }
@@ -230,8 +237,8 @@ vec3 variances_of(Sums s, uint b, vec3 mean, out mat3 v) {
     return vec3(a[0][0], a[1][1], a[2][2]);
 }
 
-// The ellipsoid in place of particle k; center in radii. `above`: its density above the splash threshold, as a part of a
-// filled body's.
+// The ellipsoid in place of particle k; center in radii. `above`: its density above where no class is kept any more, as a part
+// of a filled body's: below that it is the splash's ball, so that a class that changes changes no shape.
 void write_in_place(uint k, vec3 center, float above, Sums s, uint b) {
     vec3 mean = of(s.first, b) / s.weight[b];
     mat3 v;
@@ -273,7 +280,7 @@ void finish(uint k, vec3 x, Sums s, uint b) {
         return;
     }
     note(BODY);
-    if (!YU_TURK) write_in_place(k, center, relative - prepare.splash_below, s, b);
+    if (!YU_TURK) write_in_place(k, center, relative - prepare.keep_below, s, b);
     else if (s.number[b] <= prepare.min_neighbours + 1u) write_sphere(k, center, FEW_NEIGHBOURS);
     else write_yu_turk(k, center, s, b);
 }

@@ -98,10 +98,21 @@ pub(crate) struct Preparation {
     pub entries: u64,
     /// Whether ellipsoids are YuTurk13's.
     pub yu_turk: bool,
-    /// Whether classes are kept from frame to frame.
-    pub keep_classes: bool,
+    /// By what classes are kept from frame to frame, if they are.
+    pub kept: Option<Kept>,
+    /// Whether no classes of the last frame's count.
+    pub anew: bool,
     /// Neighbours of each particle that are listed.
     pub neighbours: u32,
+}
+
+/// Classes that are kept from frame to frame.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Kept {
+    /// By ids of the host's, or else by index in its buffer.
+    pub by_id: bool,
+    /// How many there are.
+    pub number: u32,
 }
 
 impl<'a> Scene<'a> {

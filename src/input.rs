@@ -159,6 +159,9 @@ impl<'a> FrameInput<'a> {
         if self.positions.is_some_and(|p| p.count > 0 && p.buffer == vk::Buffer::null()) {
             return Err(Error::parameter("buffer of positions", "null", "give the buffer that holds them"));
         }
+        if self.positions.is_some_and(|p| p.count > 0 && p.ids.is_some_and(|ids| ids.buffer == vk::Buffer::null())) {
+            return Err(Error::parameter("buffer of ids", "null", "give the buffer that holds them, or no ids"));
+        }
         Ok(())
     }
 

@@ -58,7 +58,7 @@ pub fn counted(report: &Report) -> [(&'static str, usize); 6] {
 /// The report that counters of a frame are, which prepared particles on the device.
 pub fn report(counters: &[(&str, u32)]) -> Report {
     let count = |name| counters.iter().find(|c| c.0 == name).map_or(0, |c| c.1 as usize);
-    let [splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio] = COUNTED.map(count);
+    let [splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio, _] = COUNTED.map(count);
     Report { splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio }
 }
 

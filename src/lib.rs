@@ -32,7 +32,9 @@
 //! * Left-handed worlds, viewports of negative height, reversed and infinite depth: see [`Camera`].
 //! * Particles are prepared on the host ([`prepare::prepare`], [`Renderer::set_particles`]) or, frame by frame, on the device
 //!   from positions in a buffer of the host's ([`prepare::DevicePositions`]): then no count ever comes back, and what a
-//!   scene does not need is an indirect draw or dispatch of nothing.
+//!   scene does not need is an indirect draw or dispatch of nothing. Such a buffer, and that of ids
+//!   ([`prepare::DeviceIds`]), is the host's: its writes are visible to reads in compute shaders before the frame, which
+//!   only reads it.
 //! * The same input gives the same bits on the same driver; prepared on the host, in whatever order the particles come.
 //!
 //! # Spaces and units

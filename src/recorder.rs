@@ -20,6 +20,8 @@ pub(crate) struct Externals {
     pub frame_block: vk::Buffer,
     /// Buffer, offset and range of the host's positions.
     pub positions: (vk::Buffer, u64, u64),
+    /// The same of their ids.
+    pub ids: (vk::Buffer, u64, u64),
     /// Centres and shapes, where the host prepared them.
     pub particles: [vk::Buffer; 3],
     /// How fast they are, where the host said so.
@@ -291,6 +293,7 @@ impl Recorder<'_> {
                 Ok((self.externals.frame_block, scale.offset(), size_of::<shader::Frame>() as u64))
             }
             Made::Given(External::Positions) => Ok(self.externals.positions),
+            Made::Given(External::Ids) => Ok(self.externals.ids),
             Made::Given(External::Centers) => all(centers),
             Made::Given(External::Diagonals) => all(diagonals),
             Made::Given(External::Mixed) => all(mixed),

@@ -6,9 +6,8 @@ mod uploads;
 use crate::{
     Error, access,
     device::{self, Host, Limits},
-    frame::{self, Preparation, Scene},
+    frame::{self, Kept, Preparation, Scene},
     input::{EnvironmentInput, EnvironmentShape, FrameInput},
-    passes::shape::LAST_CLASSES,
     pipeline::Pipelines,
     plan::{Home, Made, Plan},
     prepare::{self, DevicePositions},
@@ -57,8 +56,8 @@ pub struct Renderer {
     /// Names of the last frame's counters.
     #[cfg(feature = "inspect")]
     pub(crate) counters: [Vec<&'static str>; 2],
-    /// Whether the last frame left classes.
-    last_classes: bool,
+    /// What classes the last frame left, if any.
+    last_classes: Option<Kept>,
 }
 
 /// What the renderer remembers of the particles it was given.
@@ -115,7 +114,7 @@ impl Renderer {
             surfaces: Default::default(),
             #[cfg(feature = "inspect")]
             counters: Default::default(),
-            last_classes: false,
+            last_classes: None,
         };
         for _ in 0..renderer.host.frames_in_flight {
             match Slot::new(&renderer.host) {
@@ -171,10 +170,10 @@ impl Renderer {
                 scene.count = p.count;
                 // Only the device will know whether there are particles of each class.
                 (scene.splash, scene.body) = (p.count > 0, p.count > 0);
-                let constants = p.constants(p.offset % BINDING_ALIGNMENT)?;
-                let keep_classes = p.keep_class_below.is_some();
+                let constants = p.constants(BINDING_ALIGNMENT)?;
                 let yu_turk = p.options.ellipsoids == prepare::Fit::YuTurk;
-                let made = Preparation { constants, entries: p.entries(), yu_turk, keep_classes, neighbours: 0 };
+                let (entries, kept) = (p.entries(), p.kept());
+                let made = Preparation { constants, entries, yu_turk, kept, anew: true, neighbours: 0 };
                 scene.prepare = (p.count > 0).then_some(made);
             }
         }
@@ -184,12 +183,14 @@ impl Renderer {
     /// Refuses particles on the device whose buffers it cannot bind.
     fn check_bindings(&self, plan: &Plan, p: &DevicePositions) -> Result<(), Error> {
         let largest = self.limits.storage_size;
-        let asked = BINDING_ALIGNMENT + p.stride * u64::from(p.count);
+        let asked = |stride| BINDING_ALIGNMENT + stride * u64::from(p.count);
+        let given =
+            [("positions (host's)", asked(p.stride)), ("ids (host's)", p.ids.map_or(0, |ids| asked(ids.stride)))];
         let buffers = plan.resources.iter().filter_map(|r| match r.made {
             Made::Own(Spec::Buffer { bytes, .. }) => Some((r.name, bytes)),
             _ => None,
         });
-        for (name, bytes) in buffers.chain([("positions (host's)", asked)]) {
+        for (name, bytes) in buffers.chain(given) {
             if bytes > largest || p.entries() > u64::from(u32::MAX) {
                 let remedy = format!("{name} would take {bytes} bytes; this device binds {largest} at most");
                 return Err(Error::parameter("particles", p.count, remedy));
@@ -210,8 +211,9 @@ impl Renderer {
     /// * `cmd` is recording, outside rendering, and goes to a queue of the family in [`Host`], after all frames
     ///   recorded before it.
     /// * The frame last recorded into `input.slot` has completed on the device.
-    /// * The buffer of [`FrameInput::positions`] is alive until the frame has completed, holds what is said of it, has
-    ///   usage `STORAGE_BUFFER`, and its earlier writes are visible to reads in compute shaders.
+    /// * The buffer of [`FrameInput::positions`], and that of their ids if they have any, are alive until the frame has
+    ///   completed, hold what is said of them, have usage `STORAGE_BUFFER`, and their earlier writes are visible to reads
+    ///   in compute shaders. What is written there later waits for the frame's compute shaders.
     /// * The output, and what there is of the scene and of an environment of the host's, are alive until the frame has
     ///   completed and in the stated layouts; output and scene are of this size. Their earlier writes are visible to
     ///   sampling in fragment shaders, and those of the output to the colour-attachment stage.
@@ -234,14 +236,18 @@ impl Renderer {
         };
         let mut bounds = self.scene.bounds;
         let mut space = self.scene.space;
-        let mut positions = (vk::Buffer::null(), 0, 0);
+        let [mut positions, mut ids] = [(vk::Buffer::null(), 0, 0); 2];
         let mut scene = self.scene_of(input)?;
         if let Some(p) = &input.positions {
             // The device finds the box; what is written here never shows.
             (bounds, space) = ((Vec3::ZERO, Vec3::ZERO), Space::new(p.radius, Vec3::ZERO));
             if p.count > 0 {
-                let begin = p.offset % BINDING_ALIGNMENT;
-                positions = (p.buffer, p.offset - begin, begin + p.stride * u64::from(p.count - 1) + 12);
+                let bound = |buffer, offset, stride, bytes| {
+                    let begin = offset % BINDING_ALIGNMENT;
+                    (buffer, offset - begin, begin + stride * u64::from(p.count - 1) + bytes)
+                };
+                positions = bound(p.buffer, p.offset, p.stride, 12);
+                ids = p.ids.map_or(ids, |ids| bound(ids.buffer, ids.offset, ids.stride, 4));
             }
         }
         self.check_speeds(&scene)?;
@@ -259,12 +265,9 @@ impl Renderer {
         if input.slot >= self.slots.len() {
             return Err(Error::parameter("slot", input.slot, "use less than Host::frames_in_flight"));
         }
-        let keeps_classes = scene.prepare.is_some_and(|p| p.keep_classes);
+        let kept = scene.prepare.and_then(|p| p.kept);
         if let Some(p) = &mut scene.prepare {
-            // The buffer that the last frame left is still the one, if it is as large as this frame's.
-            let old = self.tables[0].get(LAST_CLASSES).map(|e| e.spec);
-            let same = matches!(old, Some(Spec::Buffer { bytes, .. }) if bytes == 4 * u64::from(scene.count));
-            p.constants.has_last_classes = u32::from(keeps_classes && same && self.last_classes);
+            p.anew = kept != self.last_classes;
         }
         let plan = frame::plan(&scene)?;
         if let Some(p) = &input.positions {
@@ -274,6 +277,8 @@ impl Renderer {
         check_memory(&self.host, &self.limits, &self.tables, &plan)?;
         self.pipelines.make(&self.host, plan.recipes())?;
 
+        // None, should what follows fail.
+        self.last_classes = None;
         let slot = &mut self.slots[input.slot];
         // The slot's last frame has completed, and with it every frame before.
         self.retired.collect(&self.host, slot.frame);
@@ -283,7 +288,7 @@ impl Renderer {
             table.fit(&self.host, &plan, home, &mut self.retired, self.frame)?;
             table.discard_contents();
         }
-        self.last_classes = keeps_classes;
+        self.last_classes = kept;
         #[cfg(feature = "inspect")]
         {
             self.surfaces = plan.surfaces;
@@ -304,6 +309,7 @@ impl Renderer {
         let externals = Externals {
             frame_block: slot.frame_block.handle,
             positions,
+            ids,
             particles: particles.map_or([vk::Buffer::null(); 3], |b| b.each_ref().map(|b| b.handle)),
             speeds: self.speeds.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
             environment: (environment.view, environment.layout),
@@ -346,7 +352,7 @@ impl Renderer {
         for table in &mut self.tables {
             table.retire_all(&mut self.retired, self.frame + 1);
         }
-        self.last_classes = false;
+        self.last_classes = None;
         if let Some(slot) = self.slots.get_mut(slot) {
             // That this slot is free again says nothing of frames before this one, which may still run.
             slot.frame = 0;

@@ -226,7 +226,7 @@ struct Prepare {
     float support;             // h, of the number density's kernel
     float reach;               // of the neighbours that shape ellipsoids: h, or YuTurk13's 2 h
     float splash_below;        // a splash has less than this fraction of a filled body's density
-    float keep_below;          // below this fraction the last frame's class is kept
+    float keep_below;          // below this fraction the last frame's class is kept; from here on shapes fade in
     float filled_density;      // sum of a filled body's weights
     float unit_scale;          // the power of two
     float smoothing;           // lambda of YuTurk13
@@ -236,8 +236,10 @@ struct Prepare {
     float flat_offset;         // how far below a flat surface's particle the mean of its neighbours lies, in r
     uint min_neighbours;       // with no more YuTurk13's particle stays a sphere
     uint sort_pass;
-    uint has_last_classes;     // 1 if the last frame left classes
     uint cells_around;         // cells to either side of a particle's own that hold neighbours
+    uint first_id_word;        // where ids begin in their buffer
+    uint id_word_stride;       // words from one id to the next
+    uint kept_classes;         // classes that are kept: one for each id, or for each particle
 };
 
 // How a look-up is moved: by the normal times T; to where the bent ray's direction vanishes, with an index that grows with T;

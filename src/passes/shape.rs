@@ -3,22 +3,23 @@
 use super::{Arrays, rectangle, sort::Sorted};
 use crate::{
     frame::{Preparation, Scene},
-    plan::{Call, Plan, Target},
+    plan::{Call, External, Plan, Target},
     shader::{PARTICLE_GROUP, SHAPE_COMP, SHAPE_RUN},
 };
 
-/// What becomes of particles, in the order of `glsl/shape.comp`.
-pub(crate) const COUNTED: [&str; 6] = [
+/// What becomes of particles, in the order of `glsl/shape.comp`; the last one only where they have ids.
+pub(crate) const COUNTED: [&str; 7] = [
     "splash",
     "body",
     "ellipsoid_few_neighbours",
     "ellipsoid_degenerate",
     "ellipsoid_clamped_long",
     "ellipsoid_clamped_ratio",
+    "id_out_of_range",
 ];
 
-/// The array that keeps classes from frame to frame.
-pub(crate) const LAST_CLASSES: &str = "last classes";
+/// What classes start as: as if all had been body.
+const BODY: u32 = 1;
 
 pub(crate) fn record(
     plan: &mut Plan,
@@ -35,19 +36,24 @@ pub(crate) fn record(
         mixed: array("particle shapes (mixed)"),
     };
     let listed = preparation.neighbours > 0;
-    let mut call = Call::compute(&SHAPE_COMP[usize::from(listed) + 2 * usize::from(preparation.keep_classes)])
+    let by_id = preparation.kept.is_some_and(|kept| kept.by_id);
+    let mut call = Call::compute(&SHAPE_COMP[usize::from(listed) + 2 * usize::from(preparation.kept.is_some())])
         .read("extent", extent)
         .read("order", sorted.order)
         .read("sorted", sorted.positions)
         .write("centers", arrays.centers)
         .write("diagonals", arrays.diagonals)
         .write("mixed", arrays.mixed)
-        .counting(&COUNTED)
+        .counting(if by_id { &COUNTED } else { &COUNTED[..6] })
         .constant("RELATION_TABLE", preparation.constants.entries_per_particle != 1)
         .constant("YU_TURK", preparation.yu_turk)
         .push_all(&preparation.constants);
-    if preparation.keep_classes {
-        call = call.update("last_classes", plan.array(LAST_CLASSES, 4 * count));
+    if let Some(kept) = preparation.kept {
+        let classes =
+            plan.kept_array("shape", "last classes", 4 * u64::from(kept.number), preparation.anew.then_some(BODY));
+        // Without ids nothing is read of what is bound instead.
+        let ids = if by_id { plan.given(External::Ids) } else { sorted.order };
+        call = call.update("last_classes", classes).read("ids", ids).constant("BY_ID", by_id);
     }
     if listed {
         let lists = plan.array("neighbours (debug)", 4 * (2 + u64::from(preparation.neighbours)) * count);

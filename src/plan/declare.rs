@@ -80,6 +80,7 @@ impl Plan {
             External::FrameBlock(Scale::Full) => ("frame block", Home::View),
             External::FrameBlock(Scale::Half) => ("frame block (half)", Home::View),
             External::Positions => ("positions (host's)", Home::Particles),
+            External::Ids => ("ids (host's)", Home::Particles),
             External::Centers => ("particle centres", Home::Particles),
             External::Diagonals => ("particle shapes (diagonal)", Home::Particles),
             External::Mixed => ("particle shapes (mixed)", Home::Particles),

@@ -39,6 +39,7 @@ pub(crate) enum External {
     /// The slot's uniform block for passes at this scale, which the host has just written.
     FrameBlock(Scale),
     Positions,
+    Ids,
     Centers,
     Diagonals,
     Mixed,

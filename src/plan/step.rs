@@ -138,6 +138,17 @@ impl Plan {
         self.step(pass, vec![(buffer, Access::TransferWrite)], Work::Fill { buffer, offset, bytes, word });
     }
 
+    /// A buffer whose bytes grow with the number of particles, and which keeps what it holds from frame to frame but in
+    /// those that start it anew, all of this word. Made for being filled in either case: so it stays the same buffer.
+    pub fn kept_array(&mut self, pass: &'static str, name: &'static str, bytes: u64, anew: Option<u32>) -> Target {
+        let array = self.array(name, bytes);
+        match anew {
+            Some(word) => self.fill(pass, array, 0, vk::WHOLE_SIZE, word),
+            None => self.used(pass, array, Access::TransferWrite),
+        }
+        array
+    }
+
     /// A dispatch of a compute shader.
     pub fn dispatch(&mut self, pass: &'static str, mut call: Call, groups: Groups) {
         if !call.counts.is_empty() {

@@ -48,7 +48,8 @@ pub(super) fn relative_densities(grid: &Grid, scale: Scale, search: Search) -> V
 ///
 /// Against popping from frame to frame there are two thresholds: a particle of `last` class (same
 /// order) keeps it while its ρ/ρ0 lies in `splash_threshold..upper`. Hand the result to
-/// [`prepare`](super::prepare) as [`Input::classes`](super::Input::classes).
+/// [`prepare`](super::prepare) as [`Input::classes`](super::Input::classes), and `upper` as
+/// [`Input::keep_class_below`](super::Input::keep_class_below).
 pub fn classify(
     positions: &[Vec3],
     radius: f32,

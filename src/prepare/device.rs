@@ -6,7 +6,7 @@ use super::{
     ellipsoids::{flat_offset, lattice_variance},
     options::Scale,
 };
-use crate::{Error, shader::Prepare, space};
+use crate::{Error, frame::Kept, shader::Prepare, space};
 use ash::vk;
 
 /// Positions in device memory, to be prepared within the frame that draws them: neighbours, classes and ellipsoids as
@@ -27,16 +27,84 @@ pub struct DevicePositions {
     pub radius: f32,
     /// What can be chosen.
     pub options: Options,
-    /// Hysteresis against popping: a particle (the same index in the buffer) keeps the class that the last frame gave it
-    /// while its density lies between [`Options::splash_threshold`] and this share of a filled body's.
+    /// Hysteresis against popping: a particle keeps the class that the last frame gave it while its density lies between
+    /// [`Options::splash_threshold`] and this share of a filled body's; lower than that it changes nothing. Ellipsoids in
+    /// place grow out of the splash's ball from this share on, so that no shape jumps with its class. That makes thin
+    /// liquid rounder: a tenth above the threshold is plenty.
+    ///
+    /// The last frame's classes count if that frame had hysteresis by the same indices or ids, and as many of them;
+    /// without, as if all had been body.
     pub keep_class_below: Option<f32>,
+    /// Which particle is which, for [`DevicePositions::keep_class_below`], which alone reads them: needed where the
+    /// simulation re-sorts its particles, or their number changes. Without, particles go by their index in the buffer.
+    pub ids: Option<DeviceIds>,
+}
+
+/// Ids of particles in device memory: one of 32 bits a particle, in the order of the positions.
+///
+/// A particle whose id is not below [`DeviceIds::number`] has the class that its density alone gives it, and is counted
+/// (`id_out_of_range`). Of two particles with one id the next frame remembers one's class, and nobody knows whose.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct DeviceIds {
+    /// The host's buffer, with usage `STORAGE_BUFFER`; it may be that of the positions.
+    pub buffer: vk::Buffer,
+    /// Where the first one begins, in bytes; a multiple of 4.
+    pub offset: u64,
+    /// Bytes from one to the next; a multiple of 4, at least 4.
+    pub stride: u64,
+    /// How many ids there may be, at least 1: all are below this. Each takes 4 bytes of device memory. Unlike the number
+    /// of particles it stays the same from frame to frame; another one starts without last classes.
+    pub number: u32,
+}
+
+impl DeviceIds {
+    /// Ids below `number` that fill a buffer without gaps.
+    pub fn packed(buffer: vk::Buffer, number: u32) -> DeviceIds {
+        DeviceIds { buffer, offset: 0, stride: 4, number }
+    }
+
+    /// The same, beginning at a byte of the buffer and lying so many bytes apart.
+    #[must_use]
+    pub fn laid_out(self, offset: u64, stride: u64) -> Self {
+        DeviceIds { offset, stride, ..self }
+    }
+}
+
+/// Words of a buffer of the host's, one group of them a particle.
+struct Layout {
+    /// Where it stands in an error.
+    offset_of: &'static str,
+    stride_of: &'static str,
+    offset: u64,
+    stride: u64,
+    /// Bytes of one group.
+    bytes: u64,
+}
+
+impl Layout {
+    fn check(&self, count: u32) -> Result<(), Error> {
+        if !self.offset.is_multiple_of(4) {
+            return Err(Error::parameter(self.offset_of, self.offset, "use a multiple of 4 bytes"));
+        }
+        if !self.stride.is_multiple_of(4) || self.stride < self.bytes || self.stride > 1 << 20 {
+            let remedy = format!("use a multiple of 4 bytes, {} at least and a mebibyte at most", self.bytes);
+            return Err(Error::parameter(self.stride_of, self.stride, remedy));
+        }
+        let span = self.stride.checked_mul(u64::from(count)).and_then(|s| s.checked_add(self.offset));
+        if span.is_none_or(|end| end > 1 << 48) {
+            let remedy = "offset and stride times count lie beyond any buffer";
+            return Err(Error::parameter(self.offset_of, self.offset, remedy));
+        }
+        Ok(())
+    }
 }
 
 impl DevicePositions {
     /// Positions that fill a buffer without gaps, prepared with the default options.
     pub fn packed(buffer: vk::Buffer, count: u32, radius: f32) -> DevicePositions {
         let options = Options::default();
-        DevicePositions { buffer, offset: 0, stride: 12, count, radius, options, keep_class_below: None }
+        DevicePositions { buffer, offset: 0, stride: 12, count, radius, options, keep_class_below: None, ids: None }
     }
 
     /// The same, beginning at a byte of the buffer and lying so many bytes apart.
@@ -57,6 +125,18 @@ impl DevicePositions {
         DevicePositions { keep_class_below: share.into(), ..self }
     }
 
+    /// The same with ids, or without: see [`DevicePositions::ids`].
+    #[must_use]
+    pub fn ids(self, ids: impl Into<Option<DeviceIds>>) -> Self {
+        DevicePositions { ids: ids.into(), ..self }
+    }
+
+    /// By what the frame keeps classes, if it does.
+    pub(crate) fn kept(&self) -> Option<Kept> {
+        self.keep_class_below?;
+        Some(Kept { by_id: self.ids.is_some(), number: self.ids.map_or(self.count, |ids| ids.number) })
+    }
+
     /// Entries a particle has in the sort.
     fn entries_per_particle(&self) -> u32 {
         match self.options.search {
@@ -70,21 +150,19 @@ impl DevicePositions {
         u64::from(self.count) * u64::from(self.entries_per_particle())
     }
 
-    /// Checks radius, options, offset and stride, and makes the passes' constants; `begin` is what is left of the offset
-    /// when it was rounded down to what the device can bind.
-    pub(crate) fn constants(&self, begin: u64) -> Result<Prepare, Error> {
+    /// Checks radius, options, offsets and strides, and makes the passes' constants; offsets are rounded down to this
+    /// alignment where buffers are bound.
+    pub(crate) fn constants(&self, alignment: u64) -> Result<Prepare, Error> {
         let scale = Scale::new(self.radius, &self.options)?;
-        if !self.offset.is_multiple_of(4) {
-            return Err(Error::parameter("offset of positions", self.offset, "use a multiple of 4 bytes"));
-        }
-        if !self.stride.is_multiple_of(4) || self.stride < 12 || self.stride > 1 << 20 {
-            let remedy = "use a multiple of 4 bytes, 12 at least and a mebibyte at most";
-            return Err(Error::parameter("stride of positions", self.stride, remedy));
-        }
-        let span = self.stride.checked_mul(u64::from(self.count)).and_then(|s| s.checked_add(self.offset));
-        if span.is_none_or(|end| end > 1 << 48) {
-            let remedy = "offset and stride times count lie beyond any buffer";
-            return Err(Error::parameter("offset of positions", self.offset, remedy));
+        let (offset, stride) = (self.offset, self.stride);
+        let [offset_of, stride_of] = ["offset of positions", "stride of positions"];
+        Layout { offset_of, stride_of, offset, stride, bytes: 12 }.check(self.count)?;
+        if let Some(DeviceIds { offset, stride, number, .. }) = self.ids {
+            let [offset_of, stride_of] = ["offset of ids", "stride of ids"];
+            Layout { offset_of, stride_of, offset, stride, bytes: 4 }.check(self.count)?;
+            if number == 0 {
+                return Err(Error::parameter("number of ids", 0, "use one more than the largest id"));
+            }
         }
         if self.keep_class_below.is_some_and(f32::is_nan) {
             return Err(Error::parameter("upper splash threshold", f32::NAN, "use a number"));
@@ -99,7 +177,7 @@ impl DevicePositions {
         let o = &self.options;
         Ok(Prepare {
             count: self.count,
-            first_word: (begin / 4) as u32,
+            first_word: (self.offset % alignment / 4) as u32,
             word_stride: (self.stride / 4) as u32,
             entries_per_particle: self.entries_per_particle(),
             cell_edge: cell_edge as f32 * power,
@@ -107,7 +185,7 @@ impl DevicePositions {
             support: scale.support as f32 * power,
             reach: scale.reach as f32 * power,
             splash_below: o.splash_threshold,
-            keep_below: self.keep_class_below.unwrap_or(o.splash_threshold),
+            keep_below: self.keep_class_below.map_or(o.splash_threshold, |k| k.max(o.splash_threshold)),
             filled_density: rest_density(scale.support / scale.radius) as f32,
             unit_scale: power,
             smoothing: o.smoothing,
@@ -117,8 +195,10 @@ impl DevicePositions {
             flat_offset: flat_offset(reach) as f32,
             min_neighbours: u32::try_from(o.min_neighbours).unwrap_or(u32::MAX).min(u32::MAX - 1),
             sort_pass: 0,
-            has_last_classes: 0,
             cells_around: (scale.reach / cell_edge).ceil() as u32,
+            first_id_word: self.ids.map_or(0, |ids| (ids.offset % alignment / 4) as u32),
+            id_word_stride: self.ids.map_or(0, |ids| (ids.stride / 4) as u32),
+            kept_classes: self.kept().map_or(0, |k| k.number),
         })
     }
 }

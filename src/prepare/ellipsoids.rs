@@ -62,6 +62,8 @@ pub(super) struct Fitter<'a> {
     grid: &'a Grid,
     options: &'a Options,
     scale: Scale,
+    /// From what density on, as a part of a filled body's, a shape differs from a splash's.
+    fade_from: f32,
     /// A filled body's variance, density (both as of [`Sums`]), and offset below a flat surface, in world units.
     full: f64,
     filled: f64,
@@ -78,11 +80,12 @@ struct Sums {
 }
 
 impl<'a> Fitter<'a> {
-    pub fn new(grid: &'a Grid, scale: Scale, options: &'a Options) -> Self {
+    pub fn new(grid: &'a Grid, scale: Scale, options: &'a Options, keep_class_below: Option<f32>) -> Self {
         let (reach, radius) = (scale.reach / scale.radius, scale.radius);
         let full = lattice_variance(reach) * radius.powi(2);
         let filled = rest_density(scale.support / radius);
-        Self { grid, options, scale, full, filled, flat: flat_offset(reach) * radius }
+        let fade_from = keep_class_below.map_or(options.splash_threshold, |k| k.max(options.splash_threshold));
+        Self { grid, options, scale, fade_from, full, filled, flat: flat_offset(reach) * radius }
     }
 
     /// Particle `i`'s ellipsoid. It counts in its own sums with weight 1.
@@ -113,7 +116,8 @@ impl<'a> Fitter<'a> {
     /// between particles included, is that of the liquid's: what is drawn is these ellipsoids, not a field around them.
     ///
     /// Centres follow their neighbours a little, and more where these lie further to one side than under a flat surface: such
-    /// a particle protrudes. One with hardly more density than a splash has hardly another shape.
+    /// a particle protrudes. One with hardly more density than a splash, or than one that a splash may have that was
+    /// one before, has hardly another shape.
     fn in_place(&self, i: usize, near: &[Neighbour]) -> (Ellipsoid, Shape) {
         let Sums { mean, squares, density } = self.sums(i, near);
         let (variances, frame) = eigen_symmetric(squares - outer(mean, mean));
@@ -124,7 +128,7 @@ impl<'a> Fitter<'a> {
         let [splash, fade] = [SPLASH_RADIUS, SPLASH_FADE].map(f64::from);
         let [smoothing, pull] = [ELLIPSOID_SMOOTHING, ELLIPSOID_PULL].map(f64::from);
         let wanted = spread * size;
-        let share = ((density - f64::from(self.options.splash_threshold)) / fade).clamp(0.0, 1.0);
+        let share = ((density - f64::from(self.fade_from)) / fade).clamp(0.0, 1.0);
         let lengths = DVec3::splat(splash).lerp(wanted.clamp(DVec3::splat(thin), DVec3::splat(wide)), share);
         let protrudes = (1.0 - self.flat / mean.length()).max(0.0); // 0 of a mean of 0
         let center = self.grid.positions[i].as_dvec3() + mean * (share * (smoothing + pull * protrudes));

@@ -25,12 +25,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{Mat3, Vec3};
 
 pub use density::{DensityField, classify};
-pub use device::DevicePositions;
+pub use device::{DeviceIds, DevicePositions};
 pub use neighbours::Search;
 pub use options::{Fit, Options};
 pub use spacing::estimate_radius;
 
 use crate::{
+    Error,
     particles::{Class, Ellipsoid, Particles},
     shader::SPLASH_RADIUS,
 };
@@ -50,12 +51,15 @@ pub struct Input<'a> {
     pub classes: Option<&'a [Class]>,
     /// Semi-axes (columns) to use unchanged, instead of fitted ones, for particles of the body.
     pub ellipsoids: Option<&'a [Mat3]>,
+    /// Below what share of a filled body's density the classes were kept ([`classify`]'s upper threshold): ellipsoids in
+    /// place grow out of the splash's ball from there on, so that none jumps with its class.
+    pub keep_class_below: Option<f32>,
 }
 
 impl<'a> Input<'a> {
     /// Centres, and the radius of all: classes follow from the threshold, ellipsoids are fitted.
     pub fn new(positions: &'a [Vec3], radius: f32) -> Input<'a> {
-        Input { positions, radius, classes: None, ellipsoids: None }
+        Input { positions, radius, classes: None, ellipsoids: None, keep_class_below: None }
     }
 
     /// Classes of the caller's, one for each particle.
@@ -66,6 +70,11 @@ impl<'a> Input<'a> {
     /// Ellipsoids of the caller's, one for each particle.
     pub fn ellipsoids(self, ellipsoids: Option<&'a [Mat3]>) -> Input<'a> {
         Input { ellipsoids, ..self }
+    }
+
+    /// Classes that were kept from frame to frame, below this share of a filled body's density.
+    pub fn keep_class_below(self, share: Option<f32>) -> Input<'a> {
+        Input { keep_class_below: share, ..self }
     }
 }
 
@@ -181,11 +190,14 @@ fn prepare_all(
     options: &Options,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<(Particles, Report, Vec<f32>), PrepareError> {
-    let Input { positions, radius, classes, ellipsoids } = *input;
+    let Input { positions, radius, classes, ellipsoids, keep_class_below } = *input;
     let scale = Scale::new(radius, options)?;
     check_lengths("classes", classes.map(<[_]>::len), positions.len())?;
     check_lengths("ellipsoids", ellipsoids.map(<[_]>::len), positions.len())?;
     check_positions(positions)?;
+    if keep_class_below.is_some_and(f32::is_nan) {
+        return Err(Error::parameter("upper splash threshold", f32::NAN, "use a number").into());
+    }
 
     // What tells particles at the same place apart.
     let extra = |i: u32| {
@@ -205,7 +217,7 @@ fn prepare_all(
     let shapes = match ellipsoids {
         Some(given) => given_shapes(&grid, radius, &classes, given)?,
         None => {
-            let fitter = Fitter::new(&grid, scale, options);
+            let fitter = Fitter::new(&grid, scale, options, keep_class_below);
             let done = AtomicUsize::new(0);
             grid.map_neighbours(scale.reach, options.search, |i, near| {
                 let before = done.fetch_add(1, Ordering::Relaxed);

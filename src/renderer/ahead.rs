@@ -10,7 +10,7 @@ use crate::{
     frame::{self, Scene},
     input::{Background, EnvironmentShape, FrameInput},
     plan::Plan,
-    prepare::{self, DevicePositions, Search},
+    prepare::{self, DeviceIds, DevicePositions, Search},
     table::{self, LedgerEntry, Table},
 };
 use ash::vk;
@@ -85,10 +85,10 @@ impl Renderer {
         }
         for search in [Search::Runs, Search::Relation] {
             for ellipsoids in [prepare::Fit::InPlace, prepare::Fit::YuTurk] {
-                for keep in [None, Some(1.0)] {
-                    let options = prepare::Options { search, ellipsoids, ..Default::default() };
-                    let positions =
-                        DevicePositions::packed(vk::Buffer::null(), 1, 1.0).options(options).keep_class_below(keep);
+                let options = prepare::Options { search, ellipsoids, ..Default::default() };
+                let plain = DevicePositions::packed(vk::Buffer::null(), 1, 1.0).options(options);
+                let kept = plain.keep_class_below(1.0);
+                for positions in [plain, kept, kept.ids(DeviceIds::packed(vk::Buffer::null(), 1))] {
                     let mut scene = scene([0, 0]);
                     self.fill(&mut scene, Amount::OnDevice(&positions))?;
                     scenes.push(scene);

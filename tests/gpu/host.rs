@@ -2,12 +2,12 @@
 
 use crate::drivers::SKY;
 use crate::support::{Case, Choose, Cloud, Driver, camera, each_driver, random_cloud, sphere};
-use ash::vk;
+use ash::vk::{self, Handle};
 use glam::Vec3;
 use meniscus::{
     Error, FrameInput, Particles, Renderer, SceneInput, Settings,
     host::{Canvas, Gpu, HostError, Upload},
-    prepare::{DevicePositions, Search},
+    prepare::{DeviceIds, DevicePositions, Search},
     renderer::Amount,
     twin::optics::srgb_byte,
 };
@@ -282,6 +282,8 @@ fn what_the_caller_gets_wrong_is_said() {
             assert!(refused(&input(&narrow, 0, canvas.view)).contains("camera projection"));
             // Positions on the device. Nothing is recorded, so their buffer need not be there.
             let positions = DevicePositions::packed(vk::Buffer::null(), 10, 0.1);
+            let somewhere = vk::Buffer::from_raw(1);
+            let there = DevicePositions::packed(somewhere, 10, 0.1);
             let far_too_many = u32::try_from(u64::from(u32::MAX) / 2).expect("it fits");
             for (wrong, word) in [
                 (positions, "buffer of positions is null"),
@@ -291,6 +293,19 @@ fn what_the_caller_gets_wrong_is_said() {
                 (positions.laid_out(0, 13), "stride of positions is 13"),
                 (DevicePositions::packed(positions.buffer, 10, -1.0), "particle radius is -1"),
                 (positions.keep_class_below(f32::NAN), "upper splash threshold"),
+                (positions.ids(DeviceIds::packed(somewhere, 10).laid_out(6, 4)), "offset of ids is 6"),
+                (
+                    positions.ids(DeviceIds::packed(somewhere, 10).laid_out(1 << 60, 4)),
+                    "offset of ids is 1152921504606846976: offset and stride",
+                ),
+                (positions.ids(DeviceIds::packed(somewhere, 10).laid_out(0, 0)), "stride of ids is 0"),
+                (positions.ids(DeviceIds::packed(somewhere, 10).laid_out(0, 7)), "stride of ids is 7"),
+                (positions.ids(DeviceIds::packed(somewhere, 0)), "number of ids is 0"),
+                (there.ids(DeviceIds::packed(vk::Buffer::null(), 10)), "buffer of ids is null"),
+                (
+                    there.keep_class_below(0.6).ids(DeviceIds::packed(somewhere, u32::MAX)),
+                    "last classes would take 17179869180 bytes",
+                ),
                 (DevicePositions::packed(positions.buffer, far_too_many, 0.1), "particles is 2147483647"),
             ] {
                 let input = input(&case, 0, canvas.view).positions(wrong);

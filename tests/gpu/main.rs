@@ -4,6 +4,7 @@ mod access;
 mod analytic;
 mod background;
 mod behind;
+mod classes;
 mod compact;
 mod cull;
 mod drivers;

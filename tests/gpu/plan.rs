@@ -10,7 +10,7 @@ use glam::Vec3;
 use meniscus::{
     Background, FrameInput, Particles, Renderer, Settings,
     host::{Canvas, Gpu, Upload},
-    prepare::{DevicePositions, Options, Search},
+    prepare::{DeviceIds, DevicePositions, Options, Search},
     renderer::Amount,
     smooth::{Smooth, curvature_flow::CurvatureFlow, plane_fit::PlaneFit},
 };
@@ -68,10 +68,11 @@ fn a_warmed_up_renderer_compiles_nothing() {
                 }
             }
             for search in [Search::Runs, Search::Relation] {
-                for keep in [None, Some(0.6)] {
-                    let options = Options { search, ..Options::default() };
-                    let given = DevicePositions::packed(upload.buffer, positions.len() as u32, 0.1);
-                    let given = given.options(options).keep_class_below(keep);
+                let options = Options { search, ..Options::default() };
+                let given = DevicePositions::packed(upload.buffer, positions.len() as u32, 0.1).options(options);
+                let kept = given.keep_class_below(0.6);
+                // Whatever lies there will do as ids.
+                for given in [given, kept, kept.ids(DeviceIds::packed(upload.buffer, 5))] {
                     draw(gpu, renderer, &canvas, &input.positions(given));
                 }
             }

@@ -68,7 +68,7 @@ fn scattered_far(v: Vec3) -> Vec<Vec3> {
 }
 
 /// Each input index's neighbours, ascending; the places of the particles in the order of the device.
-fn listed(shot: &Shot, count: usize) -> (Vec<Vec<u32>>, Vec<usize>) {
+pub fn listed(shot: &Shot, count: usize) -> (Vec<Vec<u32>>, Vec<usize>) {
     let words = shot.words("neighbours (debug)", 0).expect("neighbours");
     let room = words.len() / count;
     let (mut lists, mut places) = (vec![Vec::new(); count], vec![usize::MAX; count]);

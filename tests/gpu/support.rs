@@ -7,7 +7,7 @@ use meniscus::{
     host::{Gpu, Instance, Session, Upload},
     inspect::{self, Inspection, Walk},
     optics::{Optics, four::Four, one::One, two::Two},
-    prepare::{self, DevicePositions},
+    prepare::{self, DeviceIds, DevicePositions},
     shader::Frame,
     smooth::{Smooth, plane_fit::PlaneFit},
     space::Space,
@@ -29,6 +29,9 @@ pub struct Cloud<'a> {
     pub positions: &'a [Vec3],
     pub options: prepare::Options,
     pub keep_class_below: Option<f32>,
+    /// One for each position, and how many there may be. They lie beside their positions where the stride leaves room, or
+    /// else in a buffer of their own.
+    pub ids: Option<(&'a [u32], u32)>,
     pub offset: usize,
     pub stride: usize,
 }
@@ -36,7 +39,7 @@ pub struct Cloud<'a> {
 impl<'a> Cloud<'a> {
     pub fn new(positions: &'a [Vec3], search: prepare::Search) -> Cloud<'a> {
         let options = prepare::Options { search, ..Default::default() };
-        Cloud { positions, options, keep_class_below: None, offset: 0, stride: 12 }
+        Cloud { positions, options, keep_class_below: None, ids: None, offset: 0, stride: 12 }
     }
 }
 
@@ -129,14 +132,23 @@ impl<'a> Driver<'a> {
         for (i, p) in cloud.positions.iter().enumerate() {
             let at = (cloud.offset + i * cloud.stride) / 4;
             words[at..at + 3].copy_from_slice(&p.to_array());
+            if let Some((ids, _)) = cloud.ids.filter(|_| cloud.stride > 12) {
+                words[at + 3] = f32::from_bits(ids[i]);
+            }
         }
         let gpu = self.session.borrow().gpu;
         let upload = Upload::new(gpu, bytemuck::cast_slice(&words)).expect("upload");
+        let own = Upload::new(gpu, bytemuck::cast_slice(cloud.ids.map_or(&[], |(ids, _)| ids))).expect("upload");
+        let ids = cloud.ids.map(|(_, number)| match cloud.stride {
+            12 => DeviceIds::packed(own.buffer, number),
+            _ => DeviceIds::packed(upload.buffer, number).laid_out(cloud.offset as u64 + 12, cloud.stride as u64),
+        });
         let count = cloud.positions.len() as u32;
         let positions = DevicePositions::packed(upload.buffer, count, case.particles.radius)
             .laid_out(cloud.offset as u64, cloud.stride as u64)
             .options(cloud.options)
-            .keep_class_below(cloud.keep_class_below);
+            .keep_class_below(cloud.keep_class_below)
+            .ids(ids);
         self.shoot_input(case, Inspection { neighbours, ..Inspection::default() }, &|input| input.positions(positions))
     }
 

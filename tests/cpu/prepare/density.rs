@@ -4,9 +4,9 @@ use glam::Vec3;
 use meniscus::particles::Class;
 use meniscus::prepare::density::{lattice, rest_density, spline};
 use meniscus::prepare::ellipsoids::lattice_variance;
-use meniscus::prepare::{DensityField, Options, PrepareError, classify, estimate_radius};
+use meniscus::prepare::{DensityField, Options, PrepareError, classify, estimate_radius, prepare};
 
-use super::{Random, block, run};
+use super::{Random, block, input, run};
 
 #[test]
 fn spline_and_lattice_have_their_closed_values() {
@@ -75,6 +75,8 @@ fn two_thresholds_keep_the_last_class_between_them() {
     assert_eq!(report.splash, 6, "the default threshold");
     let error = classify(&row, 1.0, &options, Some((&body[1..], 0.5)));
     assert!(matches!(error, Err(PrepareError::Length { found: 5, particles: 6, .. })));
+    let error = prepare(&input(&row, 1.0).keep_class_below(Some(f32::NAN)), &options);
+    assert!(matches!(error, Err(PrepareError::Option { name: "upper splash threshold", .. })));
 }
 
 #[test]
