@@ -10,6 +10,7 @@ use meniscus::{
     Camera, Ellipsoid, Particles, Settings,
     shader::{
         OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_REFLECTION_LIMIT, PATTERN_BODY, PATTERN_SPLASH, PATTERN_SPLASH_BODY,
+        SPLASH_RADIUS,
     },
     twin::normal::decode_normal,
 };
@@ -330,8 +331,8 @@ fn a_ball_on_an_edge_is_not_smoothed() {
 fn an_eye_inside_looks_out() {
     let tilt = Mat3::from_rotation_z(0.3) * Mat3::from_rotation_x(0.5);
     let body = Ellipsoid { center: Vec3::ZERO, axes: tilt * Mat3::from_diagonal(Vec3::new(3.0, 1.2, 1.0)) };
-    let ball = sphere(Vec3::ZERO, 1.0);
-    let (in_body, in_ball) = (tilt * Vec3::new(-2.2, 0.2, 0.1), Vec3::new(0.1, 0.85, 0.1));
+    let ball = sphere(Vec3::ZERO, SPLASH_RADIUS);
+    let (in_body, in_ball) = (tilt * Vec3::new(-2.2, 0.2, 0.1), SPLASH_RADIUS * Vec3::new(0.1, 0.85, 0.1));
     for (splash, shape, eye) in [(false, body, in_body), (true, ball, in_ball)] {
         let (splashes, bodies): (&[_], &[_]) = if splash { (&[shape], &[]) } else { (&[], &[shape]) };
         let camera = view(eye, eye + tilt * Vec3::new(1.0, 0.1, -0.1), 100.0);
