@@ -17,7 +17,7 @@ const ROUNDING: f64 = DEPTH_ROUNDING as f64;
 
 /// Front and back bounds as the GPU has them.
 fn bounds(shot: &Shot) -> Bounds {
-    Bounds::from_words(&shot.words("body depth bounds", 0).expect("there is a body"))
+    Bounds::from_words(shot.words("body depth bounds", 0).expect("there is a body"))
 }
 
 /// A pixel may differ only if some ray there nearly grazes a particle: then one that leaves out none of these, or three
