@@ -59,7 +59,7 @@ pub fn counted(report: &Report) -> [(&'static str, usize); 6] {
 pub fn report(counters: &[(&str, u32)]) -> Report {
     let count = |name| counters.iter().find(|c| c.0 == name).map_or(0, |c| c.1 as usize);
     let [splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio, _] = COUNTED.map(count);
-    Report { splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio }
+    Report { splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio, ..Report::default() }
 }
 
 /// Targets that hold the liquid's surfaces as light meets them: the body's after smoothing. `None` where the frame has none.

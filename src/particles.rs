@@ -6,7 +6,8 @@ use glam::{DVec3, Mat3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Class {
-    /// An isolated droplet: drawn as a sphere, never smoothed.
+    /// An isolated droplet, never smoothed: [`crate::prepare`] makes it a ball of 1.24 particle radii, whose volume is that of
+    /// a particle, (2 r)³.
     Splash = 0,
     /// Part of the liquid body: drawn as an ellipsoid, its surface smoothed.
     Body = 1,
@@ -28,6 +29,11 @@ pub struct Particles {
     /// Particle radius r: half the rest spacing.
     pub radius: f32,
     /// Splash, then body.
+    ///
+    /// A splash may be any ellipsoid. Its outline, its front and, straight on along the view ray, its back are drawn as given; but
+    /// a ray bent at a pixel goes on in a ball: the one that has the front's normal there and the view ray's chord. Of a ball
+    /// that is the ball itself. Where the near plane cuts a splash, only its back is known, and the ball that is taken has
+    /// 1.24 particle radii, whatever was given.
     pub ellipsoids: Vec<Ellipsoid>,
     /// How many of them are splash.
     pub splash_count: usize,

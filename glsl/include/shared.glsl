@@ -111,8 +111,8 @@
 #define ELLIPSOID_SMOOTHING 0.1
 // and so much of what that mean lies further to one side than under a flat surface: the particle protrudes.
 #define ELLIPSOID_PULL 0.7
-// Radius of a splash, in particle radii.
-#define SPLASH_RADIUS 1.0
+// Radius of a splash, in particle radii: its volume is a particle's, (2 r)^3.
+#define SPLASH_RADIUS 1.24
 // A body particle takes on its shape over so much density above the splash threshold, as parts of a filled body's; at the
 // threshold it is the splash's ball.
 #define SPLASH_FADE 0.15

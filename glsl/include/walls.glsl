@@ -102,7 +102,7 @@ Ball ball_at(ivec2 pixel, vec2 depths) {
     vec3 v = view_ray(vec2(pixel) + 0.5), n = decode_normal(texelFetch(splash_normal, ivec3(pixel, SIDE_FRONT), 0).x);
     float radius = (depths.y - depths.x) * dot(v, v) / max(-2.0 * dot(n, v), 1e-6);
     // Around the near plane it is the far normal.
-    if (dot(n, v) >= 0.0) return Ball(depths.y * v - n, 1.0);
+    if (dot(n, v) >= 0.0) return Ball(depths.y * v - SPLASH_RADIUS * n, SPLASH_RADIUS);
     return Ball(depths.x * v - radius * n, radius);
 }
 

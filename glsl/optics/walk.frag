@@ -198,7 +198,7 @@ void main() {
         wall.normal = decode_normal(texelFetch(splash_normal, ivec3(pixel, SIDE_FRONT), 0).x);
         vec2 depths = vec2(depth, texelFetch(splash_depth, ivec3(pixel, SIDE_BACK), 0).x);
         if (!inside) wall.ball = ball_at(pixel, depths);
-        else wall.ball = Ball(depths.y * v - wall.normal, 1.0);
+        else wall.ball = Ball(depths.y * v - SPLASH_RADIUS * wall.normal, SPLASH_RADIUS);
         w.ball = wall.ball;
     } else {
         wall.normal = body_normal_of(SIDE_FRONT, pixel);

@@ -44,7 +44,11 @@ pub const FORMATS: &[(&str, &str)] = &[
         "columns x, y, z by header, or the first three, with decimal points; columns `class`, `radius`, vx, vy, vz",
     ),
     ("npy", "NumPy array N x 3"),
-    ("npz", "NumPy archive: `position` N x 3; `radius`, `support`, `class`, `velocity` N x 3, `axes` N x 3 x 3"),
+    (
+        "npz",
+        "NumPy archive: `position` N x 3; `radius`, `support`, `class`, `velocity` N x 3, `axes` N x 3 x 3 (rows are \
+         semi-axes; of splashes, which are balls, they are ignored)",
+    ),
 ];
 
 /// What a particle file held. Lengths are in the file's own units.
@@ -61,6 +65,7 @@ pub struct ParticleFile {
     /// For each particle its velocity, in the file's units of length a second; as finite as positions are.
     pub velocities: Option<Vec<DVec3>>,
     /// For each particle its anisotropic kernel: the columns are the semi-axis vectors (the *rows* of the file's `axes`).
+    /// What is drawn has those of the body; splashes are balls.
     pub axes: Option<Vec<DMat3>>,
 }
 

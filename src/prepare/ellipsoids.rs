@@ -18,6 +18,8 @@ use crate::{
 pub(super) enum Shape {
     /// Not fitted: a splash's sphere, or the caller's ellipsoid.
     Given,
+    /// A splash's sphere in place of the caller's ellipsoid.
+    AxesIgnored,
     /// A sphere: too few neighbours.
     FewNeighbours,
     /// A sphere: the neighbours coincide.

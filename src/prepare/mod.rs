@@ -22,7 +22,7 @@ mod spacing;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::{Mat3, Vec3};
+use glam::{DMat3, Mat3, Vec3};
 
 pub use density::{DensityField, classify};
 pub use device::{DeviceIds, DevicePositions};
@@ -49,7 +49,8 @@ pub struct Input<'a> {
     pub radius: f32,
     /// Classes to use instead of the threshold's.
     pub classes: Option<&'a [Class]>,
-    /// Semi-axes (columns) to use unchanged, instead of fitted ones, for particles of the body.
+    /// Semi-axes (columns) to use unchanged, instead of fitted ones, for particles of the body. A splash stays a ball
+    /// ([`Class::Splash`]) whatever is given here; [`Report::splash_axes_ignored`] counts the ellipsoids that are another.
     pub ellipsoids: Option<&'a [Mat3]>,
     /// Below what share of a filled body's density the classes were kept ([`classify`]'s upper threshold): ellipsoids in
     /// place grow out of the splash's ball from there on, so that none jumps with its class.
@@ -94,6 +95,8 @@ pub struct Report {
     pub clamped_long: usize,
     /// Thickened to the shortest semi-axis, or with YuTurk13's fit to the largest ratio.
     pub clamped_ratio: usize,
+    /// Splashes that came with an ellipsoid other than the ball they are drawn as.
+    pub splash_axes_ignored: usize,
 }
 
 /// Why particles could not be prepared. Indices are those of the input.
@@ -160,7 +163,7 @@ pub fn prepare(input: &Input, options: &Options) -> Result<(Particles, Report), 
 /// of [`Options::ellipsoids`] and a splash a sphere, splashes first.
 ///
 /// `progress` is told how many particles are done, now and then, from any thread and not always in
-/// order; the last number is the count of particles. An ellipsoid given for a splash is ignored.
+/// order; the last number is the count of particles.
 pub fn prepare_with_progress(
     input: &Input,
     options: &Options,
@@ -252,6 +255,14 @@ fn sphere(center: Vec3, radius: f32) -> Ellipsoid {
     Ellipsoid { center, axes }
 }
 
+/// Whether these are the semi-axes of another ellipsoid than a splash's ball, by more than writing and reading them rounds. What
+/// is no ellipsoid, such as zeros, stands for none.
+fn differs_from_splash(axes: &Mat3, radius: f32) -> bool {
+    let in_balls = axes.as_dmat3() * f64::from(SPLASH_RADIUS * radius).recip();
+    let off = in_balls * in_balls.transpose() - DMat3::IDENTITY;
+    is_ellipsoid(axes) && off.to_cols_array().iter().any(|x| x.abs() > 1e-4)
+}
+
 /// The caller's ellipsoids, checked, in the grid's order.
 fn given_shapes(
     grid: &Grid,
@@ -262,15 +273,15 @@ fn given_shapes(
     let mut shapes = Vec::with_capacity(classes.len());
     let mut bad = None;
     for ((&index, &center), class) in grid.order.iter().zip(&grid.positions).zip(classes) {
-        let index = index as usize;
-        let mut ellipsoid = splash(center, radius);
-        if *class == Class::Body {
-            ellipsoid.axes = given[index];
-            if !is_ellipsoid(&given[index]) && bad.is_none_or(|bad| index < bad) {
-                bad = Some(index);
-            }
+        let (index, axes) = (index as usize, given[index as usize]);
+        shapes.push(match class {
+            Class::Splash if differs_from_splash(&axes, radius) => (splash(center, radius), Shape::AxesIgnored),
+            Class::Splash => (splash(center, radius), Shape::Given),
+            Class::Body => (Ellipsoid { center, axes }, Shape::Given),
+        });
+        if *class == Class::Body && !is_ellipsoid(&axes) && bad.is_none_or(|bad| index < bad) {
+            bad = Some(index);
         }
-        shapes.push((ellipsoid, Shape::Given));
     }
     match bad {
         Some(index) => Err(PrepareError::Ellipsoid { index }),
@@ -289,6 +300,7 @@ fn assemble(radius: f32, classes: &[Class], shapes: &[(Ellipsoid, Shape)]) -> (P
         }
         match shape {
             Shape::Given => {}
+            Shape::AxesIgnored => report.splash_axes_ignored += 1,
             Shape::FewNeighbours => report.few_neighbours += 1,
             Shape::Degenerate => report.degenerate += 1,
             Shape::Fitted { long, ratio } => {

@@ -1,6 +1,9 @@
 //! Twin of `glsl/extent.comp`: the box of all positions and the cells it occupies.
 
-use crate::{shader::FURTHEST_CELL, space::power_of_two};
+use crate::{
+    shader::{FURTHEST_CELL, SPLASH_RADIUS},
+    space::power_of_two,
+};
 use glam::{DVec3, Vec3};
 
 /// What the extent pass finds.
@@ -56,7 +59,7 @@ pub fn kept(positions: &[Vec3], radius: f32) -> Kept {
 pub fn drawn(positions: &[Vec3], radius: f32, longest: f32) -> (DVec3, DVec3) {
     let (low, high) = extent(positions, radius, 0).bounds;
     let origin = Vec3::from(kept(positions, radius).origin).as_dvec3() / f64::from(power_of_two(radius));
-    let room = f64::from(longest.max(1.0));
+    let room = f64::from(longest.max(SPLASH_RADIUS));
     let own = |x: Vec3| (x.as_dvec3() - origin) / f64::from(radius);
     (own(low) - room, own(high) + room)
 }

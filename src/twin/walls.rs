@@ -5,7 +5,7 @@
 use super::{background::Scene, normal::decode_normal, quadric::pixel_ray, watch::Watch};
 use crate::shader::{
     ACCEPTED, ACCEPTED_PIXELS, BOX_MARGIN, CLASS_BODY, CLASS_SPLASH, Frame, JUMP, SIDE_BACK, SIDE_FRONT, SIDE_NUDGE,
-    STEEP,
+    SPLASH_RADIUS, STEEP,
 };
 use glam::{DVec2, DVec3, Mat3, Vec4Swizzles};
 
@@ -327,13 +327,14 @@ impl Maps<'_> {
         let [front, back] = self.splash(pixel)?;
         let v = pixel_ray(self.frame, pixel[0] as u32, pixel[1] as u32);
         let n = self.normal(CLASS_SPLASH, SIDE_FRONT, pixel);
+        let particle = f64::from(SPLASH_RADIUS);
         if self.depth(CLASS_SPLASH, SIDE_FRONT, pixel) < 0.0 {
             // All that is known is where the ray leaves it.
-            return Some(Ball { center: back * v - n, radius: 1.0 });
+            return Some(Ball { center: back * v - particle * n, radius: particle });
         }
         let radius = (back - front) * v.dot(v) / (-2.0 * n.dot(v));
-        // At the limb a packed normal may face away; a particle's radius is 1.
-        let radius = if radius > 0.0 && radius.is_finite() { radius } else { 1.0 };
+        // At the limb a packed normal may face away.
+        let radius = if radius > 0.0 && radius.is_finite() { radius } else { particle };
         Some(Ball { center: front * v - radius * n, radius })
     }
 

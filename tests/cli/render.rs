@@ -48,10 +48,19 @@ fn stats_and_dump_are_complete() {
     assert_eq!(frame["width"], 96);
     // What was drawn can be drawn again: the dumped particles give the same picture.
     let first = run.pixels("out.png");
-    run.render(&["dump/particles.npz", "--radius", "0.05"]);
+    let said = run.render(&["dump/particles.npz", "--radius", "0.05"]);
+    assert!(!said.contains("note:"), "{said}");
     let second = run.pixels("out.png");
     let differ = first.iter().zip(&second).filter(|(a, b)| a.abs_diff(**b) > 2).count();
     assert!(differ * 100 < first.len(), "{differ} of {} values differ", first.len());
+    // Of another radius its splash is another ball than the one it brings.
+    let args = ["dump/particles.npz", "--radius", "0.04", "--stats", "stats.json"];
+    let output = run.command(&[&["render", "-o", "out.png", "--size", "96x72"], &args[..]].concat());
+    assert!(output.status.success(), "{}", crate::text(&output));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("note: 1 splash particles have axes of their own in dump/particles.npz"), "{said}");
+    let stats: serde_json::Value = serde_json::from_slice(&fs::read(run.path("stats.json")).unwrap()).unwrap();
+    assert_eq!(stats["particles"]["splash_axes_ignored"], 1);
 }
 
 #[test]

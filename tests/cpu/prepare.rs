@@ -14,6 +14,7 @@ use glam::{Mat3, Vec3};
 use meniscus::particles::{Class, Ellipsoid, Particles};
 use meniscus::prepare::{Input, Options, PrepareError, Report, Search};
 use meniscus::prepare::{prepare, prepare_with_progress};
+use meniscus::shader::SPLASH_RADIUS;
 
 const SEARCHES: [Search; 2] = [Search::Runs, Search::Relation];
 
@@ -135,8 +136,10 @@ fn given_classes_and_ellipsoids_are_used() {
     assert_eq!(particles.ellipsoids[0].center, Vec3::ZERO);
 
     let given = given.ellipsoids(Some(&axes));
-    let (particles, _) = prepare(&given, &Options::default()).unwrap();
-    let expected = [(positions[1], Mat3::IDENTITY), (positions[2], axes[2]), (positions[0], axes[0])];
+    let (particles, report) = prepare(&given, &Options::default()).unwrap();
+    assert_eq!(report.splash_axes_ignored, 0, "zeros stand for none");
+    let ball = Mat3::from_diagonal(Vec3::splat(SPLASH_RADIUS));
+    let expected = [(positions[1], ball), (positions[2], axes[2]), (positions[0], axes[0])];
     for (center, axes) in expected {
         assert!(particles.ellipsoids.contains(&Ellipsoid { center, axes }));
     }
@@ -148,6 +151,31 @@ fn given_classes_and_ellipsoids_are_used() {
             let given = given.ellipsoids(Some(&axes));
             let error = prepare(&given, &Options::default()).err();
             assert_eq!(error, Some(PrepareError::Ellipsoid { index }));
+        }
+    }
+}
+
+#[test]
+fn other_axes_of_splashes_are_counted_and_ignored() {
+    let turn = Mat3::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 0.7);
+    for radius in [1.0, 1e-12, 1e12] {
+        let ball = Mat3::from_diagonal(Vec3::splat(SPLASH_RADIUS * radius));
+        let stretched = ball * Mat3::from_diagonal(Vec3::new(1.0, 1.001, 1.0));
+        // The ball that is drawn, rounded, turned and mirrored; others; and what is no ellipsoid.
+        let as_drawn = [ball, ball * 1.00001, ball * turn, ball * Mat3::from_diagonal(Vec3::new(1.0, -1.0, 1.0))];
+        let others = [ball * 1.01, stretched, turn * stretched];
+        let none = [Mat3::ZERO, Mat3::NAN];
+        let axes = [&as_drawn[..], &others, &none].concat();
+        let positions: Vec<_> = (0..axes.len()).map(|i| 9.0 * radius * Vec3::X * i as f32).collect();
+        for class in [Class::Splash, Class::Body] {
+            let classes = vec![class; axes.len()];
+            // The body's have to be ellipsoids.
+            let n = if class == Class::Body { axes.len() - none.len() } else { axes.len() };
+            let given = Input::new(&positions[..n], radius).classes(Some(&classes[..n])).ellipsoids(Some(&axes[..n]));
+            let (particles, report) = prepare(&given, &Options::default()).unwrap();
+            let splash = class == Class::Splash;
+            assert_eq!(report.splash_axes_ignored, if splash { others.len() } else { 0 }, "{radius} {class:?}");
+            assert_eq!(particles.ellipsoids.iter().all(|e| e.axes == ball), splash);
         }
     }
 }

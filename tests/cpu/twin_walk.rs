@@ -8,7 +8,7 @@ use meniscus::{
     optics::Optics,
     shader::{
         Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_REFLECTION_LIMIT, OUTCOME_SIDE_WALL, PATTERN_BODY,
-        PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH,
+        PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH, SPLASH_RADIUS,
     },
     space::Space,
     twin::{
@@ -201,13 +201,14 @@ fn two_balls_in_a_row_bend_light_four_times() {
     assert!(compared > 500, "{compared}");
 }
 
-/// As a splash it is of a particle's size, and followed through a reflection; as body it ends at the first.
+/// As a splash it is of a splash's size, and followed through a reflection; as body it ends at the first.
 #[test]
 fn an_eye_in_a_ball_meets_the_critical_angle() {
-    let (center, radius) = (DVec3::new(0.24, 0.0, 0.0), RADIUS);
+    let radius = RADIUS * f64::from(SPLASH_RADIUS);
+    let center = DVec3::new(0.8 * radius, 0.0, 0.0);
     for (splash, reflections) in [(true, 0), (true, 1), (false, 0)] {
         let (settings, rays) = optics("two", reflections);
-        let frame = frame(&settings, (Vec3::new(-0.06, -0.3, -0.3), Vec3::new(0.54, 0.3, 0.3)));
+        let frame = frame(&settings, (center.as_vec3() - radius as f32, center.as_vec3() + radius as f32));
         let mut layers = sphere_maps(&frame, center, radius);
         // The front lies behind the near plane: as the ray cast writes it, with the normal of the other side.
         layers[0].0.fill((-0.01 / RADIUS) as f32);

@@ -10,6 +10,7 @@ use meniscus::{
     Camera, Ellipsoid, Particles, Settings,
     shader::{
         OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_REFLECTION_LIMIT, PATTERN_BODY, PATTERN_SPLASH, PATTERN_SPLASH_BODY,
+        SPLASH_RADIUS,
     },
     twin::normal::decode_normal,
 };
@@ -330,19 +331,20 @@ fn a_ball_on_an_edge_is_not_smoothed() {
 fn an_eye_inside_looks_out() {
     let tilt = Mat3::from_rotation_z(0.3) * Mat3::from_rotation_x(0.5);
     let body = Ellipsoid { center: Vec3::ZERO, axes: tilt * Mat3::from_diagonal(Vec3::new(3.0, 1.2, 1.0)) };
-    let ball = sphere(Vec3::ZERO, 1.0);
-    let (in_body, in_ball) = (tilt * Vec3::new(-2.2, 0.2, 0.1), Vec3::new(0.1, 0.85, 0.1));
-    for (splash, shape, eye) in [(false, body, in_body), (true, ball, in_ball)] {
+    let ball = sphere(Vec3::ZERO, SPLASH_RADIUS);
+    let (in_body, in_ball) = (tilt * Vec3::new(-2.2, 0.2, 0.1), SPLASH_RADIUS * Vec3::new(0.1, 0.85, 0.1));
+    // A ball is known whole: a ray that is reflected in it is followed to where it leaves.
+    for (splash, shape, eye, reflections) in [(false, body, in_body, 0), (true, ball, in_ball, 1)] {
         let (splashes, bodies): (&[_], &[_]) = if splash { (&[shape], &[]) } else { (&[], &[shape]) };
         let camera = view(eye, eye + tilt * Vec3::new(1.0, 0.1, -0.1), 100.0);
-        let mut case = case(1.0, splashes, bodies, camera, settings(2, 0));
+        let mut case = case(1.0, splashes, bodies, camera, settings(2, reflections));
         case.eye_inside = !splash;
         let q = Quadric::new(&shape);
         each_driver(|driver| {
             let (mut angles, mut lengths, mut limited) = (Vec::new(), Vec::new(), 0);
             for p in pixels(&case, &driver.shoot(&case)) {
                 let start = 0.01 / p.slant; // the near plane
-                let exact = inside(&q, p.eye, p.eye + start * p.dir, p.dir, 0);
+                let exact = inside(&q, p.eye, p.eye + start * p.dir, p.dir, reflections);
                 if exact.margin < 0.02 {
                     continue;
                 }

@@ -84,7 +84,7 @@ fn check(driver: &Driver, case: &Case, what: &str) -> Shot {
         }
         let label = format!("{}: {what}: class {class}", driver.name);
         // Splash particles are never tested against the body: the two volumes overlap.
-        let bounds = shot.words("body depth bounds", 0).filter(|_| class == CLASS_BODY).map(|w| Bounds::from_words(w));
+        let bounds = shot.words("body depth bounds", 0).filter(|_| class == CLASS_BODY).map(Bounds::from_words);
         let sides = if case.settings.walk().refractions == 1 { 1 } else { 2 };
         let want = cull(&shot.frame, &particles, bounds.as_ref(), sides);
         let got = verdicts(&shot, &case.particles, class);

@@ -139,7 +139,7 @@ const AGREEMENTS: [Agreement; 4] = [
     },
     Agreement {
         outcome: OUTCOME_SIDE_WALL,
-        both: 0.85,
+        both: 0.82,
         pattern: 0.93,
         direction: (0.72, 2.0),
         length: (0.75, 0.1),

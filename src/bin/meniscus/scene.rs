@@ -1,6 +1,6 @@
 //! From a particle file to particles as drawn.
 
-use crate::picture::Picture;
+use crate::{picture::Picture, terminal};
 use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -115,6 +115,14 @@ impl Scene {
         let velocities: Option<Vec<Vec3>> =
             file.velocities.as_ref().map(|all| all.iter().map(|v| v.as_vec3()).collect());
         let (particles, report, speeds, prepare_ms) = make(&input, velocities.as_deref(), &options, prepare)?;
+        if report.splash_axes_ignored > 0 {
+            terminal::complain(format!(
+                "note: {} splash particles have axes of their own in {}: splashes are drawn as balls of {} particle radii",
+                report.splash_axes_ignored,
+                path.display(),
+                shader::SPLASH_RADIUS
+            ));
+        }
         let density = if report.body > 0 || prepare.on_device() {
             Some(DensityField::new(&positions, radius as f32, &options)?)
         } else {

@@ -42,7 +42,13 @@ pub fn write(
     let stats = json!({
         "meniscus": env!("CARGO_PKG_VERSION"),
         "device": {"name": info.name, "driver": info.driver, "kind": info.kind, "vulkan": info.api},
-        "particles": {splash.0: splash.1, body.0: body.1, "dropped": job.scene.dropped, "radius_source": job.scene.radius_source},
+        "particles": {
+            splash.0: splash.1,
+            body.0: body.1,
+            "splash_axes_ignored": job.report().splash_axes_ignored,
+            "dropped": job.scene.dropped,
+            "radius_source": job.scene.radius_source,
+        },
         "prepare": job.picture.preparer().name(),
         "prepare_cpu_ms": job.scene.prepare_ms,
         "gpu": gpu,

@@ -153,6 +153,6 @@ fn nothing_pops() {
     }
     println!("largest change in {step} r: {most}");
     assert!((50..650).contains(&splashes), "{splashes} steps as a splash");
-    // A class that changed a ball of radius 1 to one of 1.5 would be a change of 1.25 in one step.
+    // A class that changed a ball of radius 1.24 to one of 1.5 would be a change of 0.71 in one step.
     assert!(most < 12.0 * f64::from(step), "an ellipsoid changes by {most} r in one step of {step} r");
 }
