@@ -119,8 +119,8 @@
 
 // Plane fitting: the least |n.v|, both of unit length, for which eq. (5) of Imai16 is trusted.
 #define FIT_GRAZING_LIMIT 0.01
-// The longest update of a depth that is taken, in sigma: a particle radius of the default's. Windows on more than one surface
-// ask for longer ones.
+// The longest update of a depth, in sigma: a particle radius of the default's. Windows on more than one surface ask for longer
+// ones, which are cut to it: where they were not taken, depths of one pixel would stand out.
 #define FIT_UPDATE_LIMIT 0.2
 
 // Search for walls along a ray (walls.glsl). How far into the next pixel or tile a position is taken that lies on the edge between

@@ -6,6 +6,7 @@ const float HOLE = 1e30; // g where the body has no interval
 float pixel_depth(float d) { return d / max(abs(frame.pixel_scale.x), abs(frame.pixel_scale.y)); }
 float jump_at(float d) { return max(JUMP, STEEP * pixel_depth(d)); }
 float accepted_at(float d) { return max(ACCEPTED, ACCEPTED_PIXELS * pixel_depth(d)); }
+float start_accepted_at(float d) { return max(ACCEPTED, pixel_depth(d)); }
 
 vec4 walls_at(ivec2 pixel) { return imageLoad(walls, pixel); }
 
@@ -123,6 +124,7 @@ struct Stop {
     float s;      // where the ray comes into it; at least 1 where there is none
     float end;    // where it leaves it
     bvec2 meets;  // the body, a splash
+    vec2 splash;  // depths at which the pixel's ray enters and leaves that
 };
 
 // Goes on along a line from s through tiles and pixels in which a ray stays on its side, inside the body or outside of all liquid,
@@ -132,7 +134,7 @@ Stop skip(ScreenLine line, bool inside, float nudge, float s) {
     bvec2 moves = greaterThan(abs(along), vec2(1e-6));
     vec2 per_pixel = 1.0 / mix(vec2(1.0), along, moves), ahead = vec2(greaterThan(along, vec2(0.0)));
     int level = WALL_TILE_BITS, below = int(frame.size.y);
-    Stop stop = Stop(pixel_after(line, s, nudge), s, s, bvec2(false));
+    Stop stop = Stop(pixel_after(line, s, nudge), s, s, bvec2(false), vec2(0.0));
     float d = depth_at(line, s);
     bool stopped = false;
     for (int i = 0; i < MARCH_STEPS && !stopped && stop.s < 1.0; ++i) {
@@ -145,6 +147,7 @@ Stop skip(ScreenLine line, bool inside, float nudge, float s) {
         bool beside_body = level > 0 || deep < wall.x || shallow > wall.y, beside_splash = deep < wall.z || shallow > wall.w;
         bool free = inside ? shallow > wall.x && deep < wall.y : beside_body && beside_splash;
         stop.end = end;
+        stop.splash = wall.zw;
         stop.meets = bvec2(inside || !beside_body, !inside && !beside_splash);
         stopped = !free && level == 0;
         if (free) {
@@ -171,112 +174,130 @@ struct Wall {
     Ball ball;   // of a splash
 };
 
-// Samples g pixel by pixel from s on, until it changes its sign; then narrows the bracket. True with a wall; else s is where the
-// ray is clear of the body again, or 1.
-bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alarmed, out Wall wall) {
-    float sign_of_side = inside ? 1.0 : -1.0, pixel = 1.0 / max(ray.span, 1e-6), start = START_PIXELS * pixel;
-    // f = g inside, -g outside: negative on the ray's own side.
-    float a = 0.0, fa = -1e-6, b = 0.0, fb = 0.0, at = min(max(s, 0.5 * pixel), 1.0), back = pixel, kept = 0.0;
-    Body before = body_at(line.start, depth_at(line, 0.0)), after = before; // at a and b
-    int side = SIDE_FRONT; // of the outer end of the bracket: whose term of g is followed
-    bool known = s <= start, own = false, bracketed = false, done = false, found = false;
+// A bracket around a wall: at a the ray is on its own side, at b on the other.
+struct Bracket {
+    float a;
+    float b;
+    Body at_a;
+    Body at_b;
+    Body first; // at the ray's start
+    bool own; // false: it has not been on its own side yet, and a is where it still counts as there
+};
+
+// Whether a ray that is a little on the other side of the front or back on which it has just started counts as on its own all the
+// same: a map's depths and its normals do not put a surface at quite the same place. f is g inside and -g outside.
+bool overlooked(float f, Body body, Body first, float s, float pixel, float d) {
+    bool started = s < START_PIXELS * pixel && abs(first.g) <= accepted_at(d);
+    return started && body.side == first.side && f >= 0.0 && f <= start_accepted_at(d);
+}
+
+// Samples g pixel by pixel from s on, until the ray has changed sides. Else s is where it is clear of the body's walls again
+// beyond `alarmed`, or 1.
+bool find_bracket(ScreenLine line, bool inside, float pixel, float alarmed, inout float s, out Bracket k) {
+    float sign_of_side = inside ? 1.0 : -1.0, at = clamp(0.5 * (s + alarmed), min(0.5 * pixel, 1.0), 1.0), back = pixel;
     vec2 along = line.end - line.start;
-    // A bracket that is found late is narrowed all the same.
-    for (int i = 0, last = CROSS_STEPS; i < last && !done; ++i) {
+    Body first = body_at(line.start, depth_at(line, 0.0));
+    k = Bracket(0.0, 0.0, first, first, first, false);
+    // Further on, the pixels' own depths may have noticed the wall late.
+    bool known = s <= START_PIXELS * pixel, crossed = false, clear = false;
+    for (int i = 0; i < CROSS_STEPS && !crossed && !clear; ++i) {
         float d = depth_at(line, at);
         Body body = body_at(line.start + at * along, d);
-        float f = sign_of_side * (bracketed ? body.terms[side] : body.g);
-        bool overlooked = !bracketed && at < start && f >= 0.0 && f <= accepted_at(d);
-        if (overlooked) f = -1e-6;
-        if (bracketed) {
-            if (f < 0.0) {
-                a = at;
-                fa = f;
-                before = body;
-                if (kept < 0.0) fb *= 0.5;
-                kept = -1.0;
-            } else {
-                b = at;
-                fb = f;
-                after = body;
-                if (kept > 0.0) fa *= 0.5;
-                kept = 1.0;
-            }
-        } else if (f < 0.0 && !(!inside && known && before.g < HOLE && body.g < HOLE && body.side != before.side)) {
-            if (known && at >= alarmed && -f > body.spread && -f < HOLE || at >= 1.0 || (f <= -HOLE && at >= alarmed)) done = true;
-            // Where it was on its side before, that is where it will have crossed.
-            if (!overlooked || !own) {
-                a = at;
-                fa = f;
-                before = body;
-            }
-            own = own || !overlooked;
+        float f = sign_of_side * body.g;
+        bool beside = overlooked(f, body, k.first, at, pixel, d);
+        // On the far side of a thin body the other term is the larger.
+        bool across = !inside && known && k.at_a.g < HOLE && body.g < HOLE && body.side != k.at_a.side;
+        if (beside || (f < 0.0 && !across)) {
             known = true;
+            clear = at >= 1.0 || (at >= alarmed && -f > body.spread);
+            // Where it was on its side before, that is where it will have crossed.
+            if (!beside || !k.own) {
+                k.a = at;
+                k.at_a = body;
+            }
+            k.own = k.own || !beside;
         } else {
-            b = at;
-            fb = f;
-            after = body;
-            bracketed = known;
-            if (known) last = i + NARROW_STEPS;
-            side = inside ? after.side : before.side;
-            fa = min(sign_of_side * before.terms[side], -1e-6);
-            fb = max(sign_of_side * after.terms[side], 1e-6);
-            f = fb;
+            k.b = at;
+            k.at_b = body;
+            crossed = known;
         }
-        if (bracketed) {
-            found = true;
-            bool level = abs(fa) >= HOLE || abs(fb) >= HOLE || (i & 1) == 1;
-            at = level ? 0.5 * (a + b) : b - fb * (b - a) / (fb - fa);
-            done = done || abs(f) <= max(CONVERGED, CONVERGED_DEPTH * d) || b - a <= min(1e-3 * pixel, 1e-6);
-        } else if (known) {
+        if (known && !crossed) {
             s = at;
             at = min(at + pixel, 1.0);
-        } else {
-            // The map's own pixels noticed late: back to where the ray was on its side.
+        } else if (!crossed) {
+            // Back to where the ray was on its side.
             at = max(at - back, 0.0);
             back *= 2.0;
-            if (at <= start) {
-                known = true;
-                fa = -1e-6;
-                bracketed = true;
-                last = i + NARROW_STEPS;
-                at = 0.5 * b;
-            }
+            crossed = at <= START_PIXELS * pixel;
         }
     }
-    if (!found) return false;
-    float accepted = accepted_at(depth_at(line, at));
-    vec2 pa = line.start + a * along, pb = line.start + b * along;
-    Body outer = after, inner = before;
-    vec2 p_inner = pa;
-    if (!inside) {
-        outer = before;
-        inner = after;
-        p_inner = pb;
+    return crossed;
+}
+
+// Narrows a bracket, by regula falsi (Illinois) and every other step a halving, around a root of the term of g that is the larger at
+// its outer end: `side`. A ray that has not been on its side yet started at a root, which is not the one that is looked for.
+void narrow(ScreenLine line, bool inside, float pixel, int side, inout Bracket k) {
+    float sign_of_side = inside ? 1.0 : -1.0, kept = 0.0;
+    float fa = min(sign_of_side * k.at_a.terms[side], -1e-6), fb = max(sign_of_side * k.at_b.terms[side], 1e-6);
+    vec2 along = line.end - line.start;
+    bool done = false;
+    for (int i = 0; i < NARROW_STEPS && !done; ++i) {
+        bool halve = !k.own || abs(fa) >= HOLE || abs(fb) >= HOLE || (i & 1) == 1;
+        float at = halve ? 0.5 * (k.a + k.b) : k.b - fb * (k.b - k.a) / (fb - fa), d = depth_at(line, at);
+        Body body = body_at(line.start + at * along, d);
+        float f = sign_of_side * body.terms[side];
+        if (f < 0.0 || (!k.own && overlooked(f, body, k.first, at, pixel, d))) {
+            k.own = k.own || f < 0.0;
+            k.a = at;
+            k.at_a = body;
+            fa = min(f, -1e-6);
+            if (kept < 0.0) fb *= 0.5;
+            kept = -1.0;
+        } else {
+            k.b = at;
+            k.at_b = body;
+            fb = f;
+            if (kept > 0.0) fa *= 0.5;
+            kept = 1.0;
+        }
+        done = (k.own && abs(f) <= max(CONVERGED, CONVERGED_DEPTH * d)) || k.b - k.a <= min(1e-3 * pixel, 1e-6);
     }
-    bool at_inner = abs(inner.g) <= accepted;
-    bool surface = at_inner || abs(outer.g) <= accepted;
+}
+
+// The wall that the body has between s and where a ray is clear of it again, if it has one; else s is there.
+bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alarmed, out Wall wall) {
+    float pixel = 1.0 / max(ray.span, 1e-6);
+    Bracket k;
+    if (!find_bracket(line, inside, pixel, alarmed, s, k)) return false;
+    int side = inside ? k.at_b.side : k.at_a.side;
+    narrow(line, inside, pixel, side, k);
     // The line through both ends, if one is near the surface; else the end that is, or the middle.
-    float ga = before.terms[side], gb = after.terms[side];
+    float d = depth_at(line, k.b), accepted = k.own ? accepted_at(d) : start_accepted_at(d);
+    float ga = k.at_a.terms[side], gb = k.at_b.terms[side];
     bool near_a = abs(ga) <= accepted, near_b = abs(gb) <= accepted;
-    float hit = near_a == near_b ? 0.5 * (a + b) : (near_a ? a : b);
-    if ((near_a || near_b) && max(abs(ga), abs(gb)) < HOLE && ga != gb) hit = clamp(b - gb * (b - a) / (gb - ga), a, b);
-    wall.t = t_at(ray, hit);
-    wall.cls = CLASS_BODY;
-    wall.side = !surface;
-    wall.ball = Ball(vec3(0.0), 0.0);
-    wall.beside = vec2(0.0);
-    vec2 p = line.start + hit * along;
+    float hit = near_a == near_b ? 0.5 * (k.a + k.b) : (near_a ? k.a : k.b);
+    if ((near_a || near_b) && max(abs(ga), abs(gb)) < HOLE && ga != gb) hit = clamp(k.b - gb * (k.b - k.a) / (gb - ga), k.a, k.b);
+    Body inner = k.at_a, outer = k.at_b;
+    float s_inner = k.a;
+    if (!inside) {
+        inner = k.at_b;
+        outer = k.at_a;
+        s_inner = k.b;
+    }
+    bool at_inner = abs(inner.g) <= accepted, surface = at_inner || abs(outer.g) <= accepted;
+    vec2 along = line.end - line.start;
+    wall = Wall(t_at(ray, hit), vec3(0.0), CLASS_BODY, !surface, vec2(0.0), Ball(vec3(0.0), 0.0));
     if (surface) {
         int which = outer.g < HOLE ? outer.side : inner.side;
         bvec2 whole = at_inner ? inner.whole : outer.whole;
         // On the border between two pixels, that of the one whose depth is met.
-        vec2 met = at_inner == inside ? pa : pb;
-        wall.normal = body_normal_at(which, which == SIDE_FRONT ? whole.x : whole.y, p, nearest(met));
+        vec2 met = line.start + (at_inner == inside ? k.a : k.b) * along;
+        wall.normal = body_normal_at(which, which == SIDE_FRONT ? whole.x : whole.y, line.start + hit * along, nearest(met));
     } else {
-        wall.normal = side_normal(nearest(p_inner), outer, ray.origin + wall.t * ray.dir, inside ? along : -along);
+        vec3 x = ray.origin + wall.t * ray.dir;
+        wall.normal = side_normal(nearest(line.start + s_inner * along), outer, x, inside ? along : -along);
         // Off the border between two pixels, so that a ray goes on from the one on its side.
-        vec2 ends = vec2(t_at(ray, max(a - SIDE_NUDGE * pixel, 0.0)), t_at(ray, min(b + SIDE_NUDGE * pixel, 1.0))) - wall.t;
+        vec2 ends = vec2(t_at(ray, max(k.a - SIDE_NUDGE * pixel, 0.0)), t_at(ray, min(k.b + SIDE_NUDGE * pixel, 1.0))) - wall.t;
         wall.beside = inside ? ends : ends.yx;
     }
     return true;
@@ -295,7 +316,7 @@ bool find_wall(Ray ray, bool inside, out Wall wall, out int outcome) {
         float t_ball = HOLE;
         Ball ball = Ball(vec3(0.0), 0.0);
         if (HAS_SPLASH && stop.meets.y && s < 1.0) {
-            ball = ball_at(stop.pixel, walls_at(stop.pixel).zw);
+            ball = ball_at(stop.pixel, stop.splash);
             vec2 t;
             if (meets_ball(ball, ray.origin, ray.dir, t) && t.x > 1e-4) t_ball = t.x;
         }

@@ -103,7 +103,7 @@ Sums sum_windows(ivec2 home, vec4 own, float ray_x, vec4 ray_y) {
     return s;
 }
 
-// The depth of a column's pixel k on the plane of eqs. (3) and (4), or its own where eq. (5) is not to be trusted.
+// The depth of a column's pixel k on the plane of eqs. (3) and (4), no further from its own than eq. (5) is to be trusted.
 float fitted(Sums s, int k, vec3 v, float own) {
     vec3 normal = vec3(s.nx[k], s.ny[k], s.nz[k]);
     float length_sum = length(normal);
@@ -118,11 +118,10 @@ float fitted(Sums s, int k, vec3 v, float own) {
         atomicAdd(counters.at[COUNTERS + 1u], 1u);
         return own;
     }
-    if (!(abs(update) <= FIT_UPDATE_LIMIT * push.sigma) || own + update < frame.near) {
-        atomicAdd(counters.at[COUNTERS + 2u], 1u);
-        return own;
-    }
-    return own + update;
+    float limit = FIT_UPDATE_LIMIT * push.sigma, cut = clamp(update, -limit, limit);
+    bool before = own + cut < frame.near;
+    if (abs(update) > limit || before) atomicAdd(counters.at[COUNTERS + 2u], 1u);
+    return before ? own : own + cut;
 }
 
 void main() {

@@ -99,7 +99,7 @@ impl Filter for PlaneFit {
     fn guards(&self) -> Option<super::Guards> {
         use crate::shader::{FIT_GRAZING_LIMIT, FIT_UPDATE_LIMIT};
         let limits = vec![("grazing", FIT_GRAZING_LIMIT, false), ("update", FIT_UPDATE_LIMIT * self.sigma, true)];
-        let meaning = "the old depth is kept where |n.v| (v unit) is below `grazing` or the update exceeds `update`";
+        let meaning = "the old depth is kept where |n.v| (v unit) is below `grazing`; updates are cut to `update`";
         Some(super::Guards { limits, meaning })
     }
 

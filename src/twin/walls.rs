@@ -36,6 +36,8 @@ pub struct Maps<'a> {
 pub struct Tolerance {
     /// |g| at a surface, at most.
     pub accepted: f64,
+    /// g on the other side that is overlooked just after a ray's start on a wall, at most.
+    pub start: f64,
     /// Depths of a footprint that differ by more are a jump.
     pub jump: f64,
 }
@@ -46,6 +48,7 @@ impl Tolerance {
         let pixel = depth / f64::from(frame.pixel_scale.abs().max_element());
         Tolerance {
             accepted: f64::from(ACCEPTED).max(f64::from(ACCEPTED_PIXELS) * pixel),
+            start: f64::from(ACCEPTED).max(pixel),
             jump: f64::from(JUMP).max(f64::from(STEEP) * pixel),
         }
     }
@@ -217,6 +220,11 @@ impl Maps<'_> {
         self.terms(x).map_or(f64::INFINITY, |[front, back]| front.max(back))
     }
 
+    /// Whose term of g is the larger at a point.
+    pub(super) fn side(&self, x: DVec3) -> u32 {
+        self.terms(x).map_or(SIDE_BACK, |[front, back]| if front > back { SIDE_FRONT } else { SIDE_BACK })
+    }
+
     /// Whether a point lies in the body.
     pub fn in_body(&self, x: DVec3) -> bool {
         self.in_view(x) && self.g(x) < 0.0
@@ -262,12 +270,12 @@ impl Maps<'_> {
         edge.lerp(limb, known).normalize()
     }
 
-    /// The wall between the ends of a bracket, one of them inside and one outside.
-    pub(super) fn wall(&self, ray: &Ray, inside: f64, outside: f64) -> Wall {
+    /// The wall between the ends of a bracket, one of them inside and one outside; `accepted`: |g| at a surface at a depth.
+    pub(super) fn wall(&self, ray: &Ray, inside: f64, outside: f64, accepted: impl Fn(Tolerance) -> f64) -> Wall {
         for t in [inside, outside] {
             let x = ray.at(t);
             if let Some([front, back]) = self.terms(x)
-                && front.max(back).abs() <= Tolerance::at(self.frame, -x.z).accepted
+                && front.max(back).abs() <= accepted(Tolerance::at(self.frame, -x.z))
             {
                 let normal = self.surface_normal(if front > back { SIDE_FRONT } else { SIDE_BACK }, x);
                 return Wall { t: inside, inside, outside, normal, side_wall: false };

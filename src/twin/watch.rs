@@ -29,7 +29,10 @@ impl Watch<'_> {
     fn stays(&self, maps: &Maps, t: f64) -> bool {
         let (g, x) = (self.beyond(maps, t), self.ray.at(t));
         let starting = maps.project(x).distance(maps.project(self.ray.origin)) <= f64::from(START_PIXELS);
-        g < 0.0 || (starting && g <= Tolerance::at(maps.frame, -x.z).accepted)
+        let from = self.ray.origin;
+        // On the front or back on which it starts.
+        let same = || maps.g(from).abs() <= Tolerance::at(maps.frame, -x.z).accepted && maps.side(x) == maps.side(from);
+        g < 0.0 || (starting && same() && g <= Tolerance::at(maps.frame, -x.z).start)
     }
 
     /// The wall, if the ray has passed one at this sample.
@@ -44,7 +47,7 @@ impl Watch<'_> {
         Some(self.passed(maps, t).unwrap_or_else(|| {
             // It never was on its own side: the wall is where that is no longer overlooked.
             let (own, other) = bisect(self.last, t, |t| !self.stays(maps, t));
-            self.between(maps, own, other)
+            self.between(maps, own, other, |at| at.start)
         }))
     }
 
@@ -53,11 +56,11 @@ impl Watch<'_> {
     pub(super) fn passed(&self, maps: &Maps, t: f64) -> Option<Wall> {
         let own = self.own.filter(|_| self.beyond(maps, t) >= 0.0)?;
         let (own, other) = bisect(own, t, |t| self.beyond(maps, t) >= 0.0);
-        Some(self.between(maps, own, other))
+        Some(self.between(maps, own, other, |at| at.accepted))
     }
 
-    fn between(&self, maps: &Maps, own: f64, other: f64) -> Wall {
+    fn between(&self, maps: &Maps, own: f64, other: f64, accepted: impl Fn(Tolerance) -> f64) -> Wall {
         let (inside, outside) = if self.inside { (own, other) } else { (other, own) };
-        maps.wall(self.ray, inside, outside)
+        maps.wall(self.ray, inside, outside, accepted)
     }
 }

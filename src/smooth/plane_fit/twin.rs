@@ -33,7 +33,7 @@ pub enum Outcome {
     ZeroNormal,
     /// Kept: the view ray runs along the plane.
     Grazing,
-    /// Kept: the plane is too far off, or before the near plane.
+    /// The plane is further off than a depth is moved, or that would be before the near plane: kept then.
     Unbounded,
 }
 
@@ -116,8 +116,8 @@ pub fn plane_fit(frame: &Frame, depth: &[f32], normal: &[u32], p: &PlaneFit) -> 
             fit.other[i] = other.map(|reach| plane_of(x, y, reach));
             fit.outcome[i] = judge(frame, p, depth[i], &plane);
             fit.plane[i] = Some(plane);
-            if fit.outcome[i] == Outcome::Fitted {
-                fit.depth[i] = plane.depth as f32;
+            if matches!(fit.outcome[i], Outcome::Fitted | Outcome::Unbounded) {
+                fit.depth[i] = moved(frame, p, depth[i], &plane) as f32;
             }
         }
     }
@@ -133,6 +133,18 @@ fn half_window(frame: &Frame, p: &PlaneFit, own: f32) -> (i32, Option<i32>) {
     }
 }
 
+/// Where a depth goes that eq. (5) moves.
+pub fn moved(frame: &Frame, p: &PlaneFit, own: f32, plane: &Plane) -> f64 {
+    let to = cut(p, own, plane);
+    if to < f64::from(frame.near) { f64::from(own) } else { to }
+}
+
+/// The plane's depth, or as far towards it as a depth is moved.
+fn cut(p: &PlaneFit, own: f32, plane: &Plane) -> f64 {
+    let (own, limit) = (f64::from(own), f64::from(FIT_UPDATE_LIMIT * p.sigma));
+    own + (plane.depth - own).clamp(-limit, limit)
+}
+
 /// Whether eq. (5) can be trusted; docs/methods.md says where it fails.
 fn judge(frame: &Frame, p: &PlaneFit, own: f32, plane: &Plane) -> Outcome {
     let update = (plane.depth - f64::from(own)).abs();
@@ -140,7 +152,7 @@ fn judge(frame: &Frame, p: &PlaneFit, own: f32, plane: &Plane) -> Outcome {
         Outcome::ZeroNormal
     } else if plane.facing < f64::from(FIT_GRAZING_LIMIT) {
         Outcome::Grazing
-    } else if update.is_nan() || update > f64::from(FIT_UPDATE_LIMIT * p.sigma) || plane.depth < f64::from(frame.near) {
+    } else if update > f64::from(FIT_UPDATE_LIMIT * p.sigma) || cut(p, own, plane) < f64::from(frame.near) {
         Outcome::Unbounded
     } else {
         Outcome::Fitted
@@ -177,7 +189,7 @@ pub fn is_close(p: &PlaneFit, frame: &Frame, own: f32, plane: &Plane) -> bool {
     }
     let slack = rounding(p, own, plane);
     let update = (plane.depth - f64::from(own)).abs();
-    plane.facing > grazing && ((update - limit).abs() < slack || (plane.depth - near).abs() < slack)
+    plane.facing > grazing && ((update - limit).abs() < slack || (cut(p, own, plane) - near).abs() < slack)
 }
 
 /// The same as every filter's twin gives it: where rounding decides whether a guard fires, a pixel is where it was or on
@@ -187,13 +199,17 @@ pub(super) fn smoothed(p: &PlaneFit, input: &Input) -> Smoothed {
     let pixel = |(i, plane): (usize, &Option<Plane>)| {
         let own = input.depth[i];
         let Some(plane) = plane else { return Pixel::kept(own) };
-        let on_plane = Pixel { depth: plane.depth, slack: rounding(p, own, plane), or: None };
+        let on_plane = Pixel { depth: moved(input.frame, p, own, plane), slack: rounding(p, own, plane), or: None };
         let pixel = match (is_close(p, input.frame, own, plane), fit.outcome[i]) {
             (true, _) => Pixel { or: Some(f64::from(own)), ..on_plane },
-            (false, Outcome::Fitted) => on_plane,
+            (false, Outcome::Fitted | Outcome::Unbounded) => on_plane,
             _ => Pixel::kept(own),
         };
-        let other = fit.other[i].map(|o| Pixel { depth: o.depth, slack: rounding(p, own, &o), or: None });
+        let other = fit.other[i].map(|o| Pixel {
+            depth: moved(input.frame, p, own, &o),
+            slack: rounding(p, own, &o),
+            or: None,
+        });
         pixel.either(other)
     };
     let pixels = fit.plane.iter().enumerate().map(pixel).collect();
