@@ -59,7 +59,7 @@ fn every_parameter_is_recorded() {
         }
         // What recomputing a dump takes.
         assert!((frame["sigma_world"].as_f64().expect("a length") - 0.2).abs() < 1e-6);
-        assert!((frame["plane_fit_guards"]["update"].as_f64().expect("a length") - 0.8).abs() < 1e-6);
+        assert!((frame["plane_fit_guards"]["update"].as_f64().expect("a length") - 0.04).abs() < 1e-6);
         assert_eq!(frame["sigma"], Value::Null, "a length in radii among lengths in world units");
         let plain = ["window", "iterations", "refractions", "internal_reflections"].map(|n| frame[n].as_u64());
         assert_eq!(plain, [Some(9), Some(2), Some(4), Some(4)]);
