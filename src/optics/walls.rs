@@ -22,7 +22,7 @@ pub(super) fn record(plan: &mut Plan, surfaces: &Surfaces, body: &Surface, splas
         .write("walls", walls)
         .constant("HAS_SPLASH", surfaces.splash.is_some())
         .constant("HAS_BODY", surfaces.body.is_some());
-    plan.dispatch("walls", call, Groups::Direct([tiles[0], tiles[1], 1]));
+    plan.dispatch("walls", call, Groups::Direct([tiles[0].div_ceil(WALL_TILE), tiles[1], 1]));
     walls
 }
 
