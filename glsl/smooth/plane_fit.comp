@@ -14,7 +14,7 @@
 #include "frame.glsl"
 #include "normal.glsl"
 #include "pixel_groups.glsl"
-layout(local_size_x_id = 0, local_size_y_id = 1) in; // a square tile of columns
+layout(local_size_x_id = 0, local_size_y_id = 1) in; // of columns
 layout(constant_id = 2) const int HALF_WINDOW = 4; // window = 2 HALF_WINDOW + 1 pixels
 layout(constant_id = 3) const bool EUCLIDEAN = false; // weights of |p_i - p_j| instead of eq. (2)
 layout(constant_id = 5) const bool PROJECTED = false; // the window is as wide as a length at the pixel's depth
@@ -30,16 +30,15 @@ layout(constant_id = 4) const uint COUNTERS = 0; // slot of its first counter
 
 const int COLUMN = 4;
 const float LOG2_E = 1.44269504;
-const int TILE = int(gl_WorkGroupSize.x);
-const int EDGE = TILE + 2 * HALF_WINDOW;
+const int WIDE = int(gl_WorkGroupSize.x) + 2 * HALF_WINDOW, TALL = int(gl_WorkGroupSize.y) * COLUMN + 2 * HALF_WINDOW;
 const float NOWHERE = 1e15; // depth where there is no surface: so far off that its weight is 0
-shared vec4 tile[EDGE * EDGE]; // raw normal, depth
+shared vec4 tile[WIDE * TALL]; // raw normal, depth
 shared uint occupied;
 
 // The window's pixels of a whole group, read once.
 void load_tile(ivec2 origin, ivec2 size, int layer) {
-    for (int k = int(gl_LocalInvocationIndex); k < EDGE * EDGE; k += TILE * TILE / COLUMN) {
-        ivec2 p = origin + ivec2(k % EDGE, k / EDGE);
+    for (int k = int(gl_LocalInvocationIndex); k < WIDE * TALL; k += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
+        ivec2 p = origin + ivec2(k % WIDE, k / WIDE);
         vec4 entry = vec4(0.0, 0.0, 0.0, NOWHERE);
         if (all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, size))) {
             float d = texelFetch(depth_in, ivec3(p, layer), 0).x;
@@ -78,7 +77,7 @@ Sums sum_windows(ivec2 home, vec4 own, float ray_x, vec4 ray_y) {
         vec4 outside = mix(vec4(0.0), vec4(-NOWHERE), greaterThan(abs(below), reach));
         vec4 across = vec4(0.0), along = vec4(0.0), total = vec4(0.0);
         [[unroll]] for (int x = -HALF_WINDOW; x <= HALF_WINDOW; ++x) {
-            vec4 entry = tile[(home.y + y) * EDGE + home.x + x];
+            vec4 entry = tile[(home.y + y) * WIDE + home.x + x];
             vec4 rise = entry.w - own;
             vec4 square = rise * rise;
             if (EUCLIDEAN) {
@@ -125,7 +124,7 @@ float fitted(Sums s, int k, vec3 v, float own) {
 }
 
 void main() {
-    ivec2 size = ivec2(frame.size), corner = pixel_group() * TILE;
+    ivec2 size = ivec2(frame.size), corner = pixel_group() * ivec2(gl_WorkGroupSize.xy) * ivec2(1, COLUMN);
     ivec2 home = ivec2(gl_LocalInvocationID.xy) * ivec2(1, COLUMN); // in the tile
     ivec2 pixel = corner + home;
     int layer = int(gl_WorkGroupID.z);

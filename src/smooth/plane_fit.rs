@@ -3,12 +3,12 @@
 #[cfg(feature = "inspect")]
 pub mod twin;
 
-use super::{Filter, alternate, edge, per_pixel};
+use super::{Filter, alternate, edge};
 use crate::{
     layers::Body,
     method::Offers,
     parameters::{choices, parameters},
-    plan::{Call, Plan, Target},
+    plan::{Call, Groups, Plan, Target},
     shader::PLANE_FIT_COMP,
 };
 
@@ -50,9 +50,11 @@ parameters! {
 /// Pixels of one invocation, one below the other.
 const COLUMN: u32 = 4;
 
-/// Edge of a work group's square of pixels: 16 bytes a tile entry have to fit the guaranteed 16 KiB of shared memory.
-fn tile(reach: u32) -> u32 {
-    if reach <= 8 { 16 } else { 8 }
+/// Pixels of a work group: the most of which 16 bytes each, with the windows around them, and a flag fit the guaranteed 16 KiB of
+/// shared memory.
+fn tile(reach: u32) -> [u32; 2] {
+    let fits = |[x, y]: &[u32; 2]| 16 * (x + 2 * reach) * (y + 2 * reach) + 4 <= 16 << 10;
+    [[16, 16], [8, 16], [8, 8]].into_iter().find(fits).unwrap_or([8, 4])
 }
 
 impl Filter for PlaneFit {
@@ -62,7 +64,7 @@ impl Filter for PlaneFit {
 
     fn record(&self, plan: &mut Plan, body: &Body) -> Target {
         let reach = self.window / 2;
-        let edge = tile(reach);
+        let [wide, tall] = tile(reach);
         let Some(normal) = body.normal else {
             plan.refuse("plane fit", "there are no normals of the particles, which it asks for".into());
             return body.depth;
@@ -78,14 +80,15 @@ impl Filter for PlaneFit {
                     "plane_fit_update_too_long",
                     "plane_fit_window_clipped",
                 ])
-                .constant("local_size_x", edge)
-                .constant("local_size_y", edge / COLUMN)
+                .constant("local_size_x", wide)
+                .constant("local_size_y", tall / COLUMN)
                 .constant("HALF_WINDOW", reach)
                 .constant("EUCLIDEAN", self.weighting == Weighting::Euclidean)
                 .constant("PROJECTED", self.projected)
                 .push("sigma", self.sigma)
                 .push("width", self.width);
-            let groups = per_pixel(plan, edge, body.sides);
+            let [width, height] = plan.size();
+            let groups = Groups::Direct([width.div_ceil(wide), height.div_ceil(tall), body.sides]);
             plan.dispatch("plane fit", call, groups);
         })
     }
