@@ -111,3 +111,17 @@ impl Filter for PlaneFit {
         twin::smoothed(self, input)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    /// 16 KiB are guaranteed, and a work group has whole columns.
+    #[test]
+    fn tiles_fit_shared_memory() {
+        for reach in 1..=super::WIDEST / 2 {
+            let [wide, tall] = super::tile(reach);
+            let entries = (wide + 2 * reach) * (tall + 2 * reach);
+            assert!(16 * entries + 4 <= 16 * 1024, "{reach}: {entries} entries");
+            assert!(tall % super::COLUMN == 0 && wide * tall / super::COLUMN >= 8, "{reach}: {wide} x {tall}");
+        }
+    }
+}
