@@ -43,7 +43,7 @@ void main() {
                 bool front = best.x <= bound.x, back = BACK_SIDES && best.y <= bound.y;
                 // Only then the surface itself.
                 float nearer, farther;
-                if (!(front || back) || !hits(c, vec3((vec2(x, y) + 0.5 - origin) / scale, -1.0), 1.0, nearer, farther)) continue;
+                if (!(front || back) || !hits(c, view_ray(vec2(x, y) + 0.5, origin, scale), 1.0, nearer, farther)) continue;
                 if (front && front_bound(max(nearer - DEPTH_ROUNDING, 0.0)) <= bound.x) verdict |= VISIBLE_FRONT;
                 if (back && back_bound(farther + DEPTH_ROUNDING) <= bound.y) verdict |= VISIBLE_BACK;
             }

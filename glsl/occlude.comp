@@ -36,7 +36,7 @@ void main() {
             uvec2 bound = bounds.at[pixel];
             bool front = best.x < bound.x, back = BACK_SIDES && best.y < bound.y;
             float nearer, farther;
-            if (!(front || back) || !hits(c, vec3((vec2(x, y) + 0.5 - origin) / scale, -1.0), -1.0, nearer, farther)) continue;
+            if (!(front || back) || !hits(c, view_ray(vec2(x, y) + 0.5, origin, scale), -1.0, nearer, farther)) continue;
             if (front_bound(nearer) < bound.x) atomicMin(bounds.at[pixel].x, front_bound(nearer));
             if (BACK_SIDES && back_bound(farther) < bound.y) atomicMin(bounds.at[pixel].y, back_bound(farther));
         }

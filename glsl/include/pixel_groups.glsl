@@ -1,5 +1,5 @@
-// Which square of pixels a work group has. Drivers on CPUs give each thread a run of groups, and
-// liquid lies low in a view: rows are dealt so that every run has some from everywhere, in eight combs of every eighth row.
+// Which rectangle of pixels a work group has. Drivers on CPUs give each thread a run of groups, and liquid lies low in a view:
+// rows are dealt so that every run has some from everywhere, in eight combs of every eighth row.
 ivec2 pixel_group() {
     uint rows = gl_NumWorkGroups.y, i = gl_WorkGroupID.y;
     uint teeth = rows / 8u, longer = rows % 8u; // so many combs have a tooth more

@@ -117,7 +117,9 @@
 // threshold it is the splash's ball.
 #define SPLASH_FADE 0.15
 
-// Plane fitting: the least |n.v|, both of unit length, for which eq. (5) of Imai16 is trusted.
+// Plane fitting: pixels of one invocation, one below the other.
+#define FIT_COLUMN 4
+// The least |n.v|, both of unit length, for which eq. (5) of Imai16 is trusted.
 #define FIT_GRAZING_LIMIT 0.01
 // The longest update of a depth, in sigma: a particle radius of the default's. Windows on more than one surface ask for longer
 // ones, which are cut to it: where they were not taken, depths of one pixel would stand out.

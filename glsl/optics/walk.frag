@@ -197,8 +197,7 @@ void main() {
     if (first == CLASS_SPLASH) {
         wall.normal = decode_normal(texelFetch(splash_normal, ivec3(pixel, SIDE_FRONT), 0).x);
         vec2 depths = vec2(depth, texelFetch(splash_depth, ivec3(pixel, SIDE_BACK), 0).x);
-        if (!inside) wall.ball = ball_at(pixel, depths);
-        else wall.ball = Ball(depths.y * v - SPLASH_RADIUS * wall.normal, SPLASH_RADIUS);
+        wall.ball = ball_at(pixel, depths);
         w.ball = wall.ball;
     } else {
         wall.normal = body_normal_of(SIDE_FRONT, pixel);

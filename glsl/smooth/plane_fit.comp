@@ -28,9 +28,8 @@ layout(set = 0, binding = 3, r32f) uniform writeonly image2DArray depth_out;
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters; // normals that cancel, grazing rays, updates too long, windows clipped
 layout(constant_id = 4) const uint COUNTERS = 0; // slot of its first counter
 
-const int COLUMN = 4;
 const float LOG2_E = 1.44269504;
-const int WIDE = int(gl_WorkGroupSize.x) + 2 * HALF_WINDOW, TALL = int(gl_WorkGroupSize.y) * COLUMN + 2 * HALF_WINDOW;
+const int WIDE = int(gl_WorkGroupSize.x) + 2 * HALF_WINDOW, TALL = int(gl_WorkGroupSize.y) * FIT_COLUMN + 2 * HALF_WINDOW;
 const float NOWHERE = 1e15; // depth where there is no surface: so far off that its weight is 0
 shared vec4 tile[WIDE * TALL]; // raw normal, depth
 shared uint occupied;
@@ -60,7 +59,7 @@ struct Sums {
 vec4 half_windows(vec4 own) {
     if (!PROJECTED) return vec4(HALF_WINDOW);
     vec4 wanted = ceil(0.5 * push.width * abs(frame.pixel_scale.y) / own);
-    [[unroll]] for (int k = 0; k < COLUMN; ++k) {
+    [[unroll]] for (int k = 0; k < FIT_COLUMN; ++k) {
         if (own[k] > 0.0 && wanted[k] > float(HALF_WINDOW)) atomicAdd(counters.at[COUNTERS + 3u], 1u);
     }
     return min(wanted, vec4(HALF_WINDOW));
@@ -72,7 +71,7 @@ Sums sum_windows(ivec2 home, vec4 own, float ray_x, vec4 ray_y) {
     vec2 step = 1.0 / frame.pixel_scale;
     float scale = -LOG2_E / (push.sigma * push.sigma);
     Sums s = Sums(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
-    for (int y = -HALF_WINDOW; y < HALF_WINDOW + COLUMN; ++y) {
+    for (int y = -HALF_WINDOW; y < HALF_WINDOW + FIT_COLUMN; ++y) {
         vec4 below = float(y) - vec4(0.0, 1.0, 2.0, 3.0); // of each pixel
         vec4 outside = mix(vec4(0.0), vec4(-NOWHERE), greaterThan(abs(below), reach));
         vec4 across = vec4(0.0), along = vec4(0.0), total = vec4(0.0);
@@ -124,13 +123,13 @@ float fitted(Sums s, int k, vec3 v, float own) {
 }
 
 void main() {
-    ivec2 size = ivec2(frame.size), corner = pixel_group() * ivec2(gl_WorkGroupSize.xy) * ivec2(1, COLUMN);
-    ivec2 home = ivec2(gl_LocalInvocationID.xy) * ivec2(1, COLUMN); // in the tile
+    ivec2 size = ivec2(frame.size), corner = pixel_group() * ivec2(gl_WorkGroupSize.xy) * ivec2(1, FIT_COLUMN);
+    ivec2 home = ivec2(gl_LocalInvocationID.xy) * ivec2(1, FIT_COLUMN); // in the tile
     ivec2 pixel = corner + home;
     int layer = int(gl_WorkGroupID.z);
     if (gl_LocalInvocationIndex == 0u) occupied = 0u;
     vec4 own = vec4(0.0); // negative (the eye is inside) and zero (nothing) pass through unchanged
-    [[unroll]] for (int k = 0; k < COLUMN; ++k) {
+    [[unroll]] for (int k = 0; k < FIT_COLUMN; ++k) {
         ivec2 p = pixel + ivec2(0, k);
         if (all(lessThan(p, size))) own[k] = texelFetch(depth_in, ivec3(p, layer), 0).x;
     }
@@ -144,11 +143,11 @@ void main() {
         vec2 ray = view_ray(vec2(pixel) + 0.5).xy;
         vec4 ray_y = ray.y + vec4(0.0, 1.0, 2.0, 3.0) / frame.pixel_scale.y;
         Sums s = sum_windows(home + HALF_WINDOW, own, ray.x, ray_y);
-        [[unroll]] for (int k = 0; k < COLUMN; ++k) {
+        [[unroll]] for (int k = 0; k < FIT_COLUMN; ++k) {
             if (own[k] > 0.0) result[k] = fitted(s, k, vec3(ray.x, ray_y[k], -1.0), own[k]);
         }
     }
-    [[unroll]] for (int k = 0; k < COLUMN; ++k) {
+    [[unroll]] for (int k = 0; k < FIT_COLUMN; ++k) {
         ivec2 p = pixel + ivec2(0, k);
         if (all(lessThan(p, size))) imageStore(depth_out, ivec3(p, layer), vec4(result[k]));
     }

@@ -164,9 +164,7 @@ impl DevicePositions {
                 return Err(Error::parameter("number of ids", 0, "use one more than the largest id"));
             }
         }
-        if self.keep_class_below.is_some_and(f32::is_nan) {
-            return Err(Error::parameter("upper splash threshold", f32::NAN, "use a number"));
-        }
+        let keep_below = self.options.fade_from(self.keep_class_below)?;
         // Sorted cells are as wide as the support, those of the relation table as the reach.
         let cell_edge = match self.options.search {
             Search::Runs => scale.support,
@@ -185,7 +183,7 @@ impl DevicePositions {
             support: scale.support as f32 * power,
             reach: scale.reach as f32 * power,
             splash_below: o.splash_threshold,
-            keep_below: self.keep_class_below.map_or(o.splash_threshold, |k| k.max(o.splash_threshold)),
+            keep_below,
             filled_density: rest_density(scale.support / scale.radius) as f32,
             unit_scale: power,
             smoothing: o.smoothing,

@@ -82,11 +82,10 @@ struct Sums {
 }
 
 impl<'a> Fitter<'a> {
-    pub fn new(grid: &'a Grid, scale: Scale, options: &'a Options, keep_class_below: Option<f32>) -> Self {
+    pub fn new(grid: &'a Grid, scale: Scale, options: &'a Options, fade_from: f32) -> Self {
         let (reach, radius) = (scale.reach / scale.radius, scale.radius);
         let full = lattice_variance(reach) * radius.powi(2);
         let filled = rest_density(scale.support / radius);
-        let fade_from = keep_class_below.map_or(options.splash_threshold, |k| k.max(options.splash_threshold));
         Self { grid, options, scale, fade_from, full, filled, flat: flat_offset(reach) * radius }
     }
 

@@ -31,7 +31,6 @@ pub use options::{Fit, Options};
 pub use spacing::estimate_radius;
 
 use crate::{
-    Error,
     particles::{Class, Ellipsoid, Particles},
     shader::SPLASH_RADIUS,
 };
@@ -198,9 +197,7 @@ fn prepare_all(
     check_lengths("classes", classes.map(<[_]>::len), positions.len())?;
     check_lengths("ellipsoids", ellipsoids.map(<[_]>::len), positions.len())?;
     check_positions(positions)?;
-    if keep_class_below.is_some_and(f32::is_nan) {
-        return Err(Error::parameter("upper splash threshold", f32::NAN, "use a number").into());
-    }
+    let fade_from = options.fade_from(keep_class_below)?;
 
     // What tells particles at the same place apart.
     let extra = |i: u32| {
@@ -220,7 +217,7 @@ fn prepare_all(
     let shapes = match ellipsoids {
         Some(given) => given_shapes(&grid, radius, &classes, given)?,
         None => {
-            let fitter = Fitter::new(&grid, scale, options, keep_class_below);
+            let fitter = Fitter::new(&grid, scale, options, fade_from);
             let done = AtomicUsize::new(0);
             grid.map_neighbours(scale.reach, options.search, |i, near| {
                 let before = done.fetch_add(1, Ordering::Relaxed);

@@ -55,6 +55,16 @@ impl Options {
             Fit::YuTurk => self.max_semi_axis,
         }
     }
+
+    /// From what share of a filled body's density on a shape differs from a splash's, where classes are kept below another
+    /// share, if they are.
+    pub(super) fn fade_from(&self, keep_class_below: Option<f32>) -> Result<f32, Error> {
+        match keep_class_below {
+            Some(k) if k.is_nan() => Err(Error::parameter("upper splash threshold", k, "use a number")),
+            Some(k) => Ok(k.max(self.splash_threshold)),
+            None => Ok(self.splash_threshold),
+        }
+    }
 }
 
 /// Lengths in world units.

@@ -9,7 +9,7 @@ use crate::{
     method::Offers,
     parameters::{choices, parameters},
     plan::{Call, Groups, Plan, Target},
-    shader::PLANE_FIT_COMP,
+    shader::{FIT_COLUMN, PLANE_FIT_COMP},
 };
 
 choices! {
@@ -47,9 +47,6 @@ parameters! {
     }
 }
 
-/// Pixels of one invocation, one below the other.
-const COLUMN: u32 = 4;
-
 /// Pixels of a work group: the most of which 16 bytes each, with the windows around them, and a flag fit the guaranteed 16 KiB of
 /// shared memory.
 fn tile(reach: u32) -> [u32; 2] {
@@ -81,7 +78,7 @@ impl Filter for PlaneFit {
                     "plane_fit_window_clipped",
                 ])
                 .constant("local_size_x", wide)
-                .constant("local_size_y", tall / COLUMN)
+                .constant("local_size_y", tall / FIT_COLUMN)
                 .constant("HALF_WINDOW", reach)
                 .constant("EUCLIDEAN", self.weighting == Weighting::Euclidean)
                 .constant("PROJECTED", self.projected)
@@ -121,7 +118,7 @@ mod tests {
             let [wide, tall] = super::tile(reach);
             let entries = (wide + 2 * reach) * (tall + 2 * reach);
             assert!(16 * entries + 4 <= 16 * 1024, "{reach}: {entries} entries");
-            assert!(tall % super::COLUMN == 0 && wide * tall / super::COLUMN >= 8, "{reach}: {wide} x {tall}");
+            assert!(tall % super::FIT_COLUMN == 0 && wide * tall / super::FIT_COLUMN >= 8, "{reach}: {wide} x {tall}");
         }
     }
 }
