@@ -44,6 +44,8 @@ pub struct Renderer {
     particles: Option<[Buffer; 3]>,
     /// How fast they are.
     speeds: Option<Buffer>,
+    /// What a density field is made of.
+    points: Option<Buffer>,
     scene: SceneBounds,
     environment: Option<Image>,
     pub(crate) barriers: Vec<PlanEntry>,
@@ -100,6 +102,7 @@ impl Renderer {
             frame: 0,
             particles: None,
             speeds: None,
+            points: None,
             scene: SceneBounds {
                 space: Space::new(1.0, Vec3::ZERO),
                 splash: 0,
@@ -152,6 +155,7 @@ impl Renderer {
         (scene.output, scene.background) = (self.output, input.background);
         scene.environment = input.environment.map_or(EnvironmentShape::Equirect, |e| e.shape);
         (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
+        scene.space = input.positions.map_or(self.scene.space, |p| Space::new(p.radius, Vec3::ZERO));
         if let Some(p) = &input.positions {
             self.fill(&mut scene, Amount::OnDevice(p))?;
         }
@@ -251,6 +255,7 @@ impl Renderer {
             }
         }
         self.check_speeds(&scene)?;
+        self.check_points(&scene)?;
         let mut block = input.camera.uniforms(input.settings, self.size, &space, bounds);
         if let Some(p) = &input.positions {
             // In the preparation's units; the extent pass moves the origin and goes on to radii.
@@ -312,6 +317,7 @@ impl Renderer {
             ids,
             particles: particles.map_or([vk::Buffer::null(); 3], |b| b.each_ref().map(|b| b.handle)),
             speeds: self.speeds.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
+            points: self.points.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
             environment: (environment.view, environment.layout),
             scene: input.scene,
             output: input.output,
@@ -382,7 +388,8 @@ impl Renderer {
             table.retire_all(&mut self.retired, 0);
         }
         self.retired.collect(&self.host, u64::MAX);
-        self.particles.take().into_iter().flatten().chain(self.speeds.take()).for_each(|mut b| b.destroy(&self.host));
+        let given = self.particles.take().into_iter().flatten().chain(self.speeds.take()).chain(self.points.take());
+        given.for_each(|mut b| b.destroy(&self.host));
         if let Some(mut i) = self.environment.take() {
             i.destroy(&self.host);
         }
