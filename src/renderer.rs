@@ -184,20 +184,22 @@ impl Renderer {
         Ok(())
     }
 
-    /// Refuses particles on the device whose buffers it cannot bind.
-    fn check_bindings(&self, plan: &Plan, p: &DevicePositions) -> Result<(), Error> {
+    /// Refuses particles whose buffers the device cannot bind.
+    fn check_bindings(&self, plan: &Plan, count: u32, positions: Option<&DevicePositions>) -> Result<(), Error> {
         let largest = self.limits.storage_size;
-        let asked = |stride| BINDING_ALIGNMENT + stride * u64::from(p.count);
-        let given =
-            [("positions (host's)", asked(p.stride)), ("ids (host's)", p.ids.map_or(0, |ids| asked(ids.stride)))];
+        let asked = |stride| BINDING_ALIGNMENT + stride * u64::from(count);
+        let given = positions.into_iter().flat_map(|p| {
+            [("positions (host's)", asked(p.stride)), ("ids (host's)", p.ids.map_or(0, |ids| asked(ids.stride)))]
+        });
+        let entries = positions.map_or(0, DevicePositions::entries);
         let buffers = plan.resources.iter().filter_map(|r| match r.made {
             Made::Own(Spec::Buffer { bytes, .. }) => Some((r.name, bytes)),
             _ => None,
         });
         for (name, bytes) in buffers.chain(given) {
-            if bytes > largest || p.entries() > u64::from(u32::MAX) {
+            if bytes > largest || entries > u64::from(u32::MAX) {
                 let remedy = format!("{name} would take {bytes} bytes; this device binds {largest} at most");
-                return Err(Error::parameter("particles", p.count, remedy));
+                return Err(Error::parameter("particles", count, remedy));
             }
         }
         Ok(())
@@ -275,9 +277,7 @@ impl Renderer {
             p.anew = kept != self.last_classes;
         }
         let plan = frame::plan(&scene)?;
-        if let Some(p) = &input.positions {
-            self.check_bindings(&plan, p)?;
-        }
+        self.check_bindings(&plan, scene.count, input.positions.as_ref())?;
         input.check_handles()?;
         check_memory(&self.host, &self.limits, &self.tables, &plan)?;
         self.pipelines.make(&self.host, plan.recipes())?;

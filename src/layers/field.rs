@@ -39,6 +39,9 @@ parameters! {
 /// Bricks that there is room for in any case, as far as so many particles can reach: 27 each.
 const LEAST_BRICKS: u64 = 4096;
 
+/// Points of which 32 bits can name 27 bricks each.
+pub(crate) const MOST_POINTS: u32 = (u32::MAX - 1) / 27;
+
 /// Balls in bricks that there is room for in any case, as far as so many particles can reach: 8 bricks each.
 const LEAST_BALLS: u64 = 65_536;
 
@@ -97,9 +100,6 @@ impl Field {
     /// Builds it.
     pub(crate) fn record(&self, plan: &mut Plan, scene: &Scene, points: &Points) -> Volume {
         let build = self.build(scene);
-        if u64::from(build.count) * 27 >= u64::from(u32::MAX) {
-            plan.refuse("field", format!("{} points are more than 32 bits can name 27 bricks of", build.count));
-        }
         let words = |n: u32| 4 * u64::from(n);
         let head = plan.buffer("field head", size_of::<FieldHead>() as u64);
         let table = plan.array("field directory", words(build.slots));

@@ -5,7 +5,7 @@ use crate::{
     Error, access,
     environment::Equirect,
     frame::Scene,
-    layers::Kind,
+    layers::{Kind, field::MOST_POINTS},
     particles::{Class, Particles, Point},
     prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},
@@ -126,9 +126,13 @@ impl Renderer {
         Ok(())
     }
 
-    /// Refuses a frame that needs points and has none.
+    /// Refuses a frame that needs points and has none, or too many.
     pub(super) fn check_points(&self, scene: &Scene) -> Result<(), Error> {
         let needed = matches!(scene.settings.method.layers.member().kind(), Kind::Field(_));
+        if needed && scene.count > MOST_POINTS {
+            let remedy = format!("a density field takes {MOST_POINTS} at most");
+            return Err(Error::parameter("particles", scene.count, remedy));
+        }
         if !needed || scene.count == 0 || scene.prepare.is_some() || self.points.is_some() {
             return Ok(());
         }

@@ -6,7 +6,7 @@ use crate::{
 };
 use glam::{Vec3, Vec4};
 use meniscus::{
-    Class, Point, Settings,
+    Class, Particles, Point, Settings,
     layers::{
         Layers,
         field::{
@@ -314,6 +314,26 @@ fn points_are_asked_for() {
         {
             let refused = session.renderer.set_points(&bad).err().map(|e| e.to_string()).unwrap_or_default();
             assert!(refused.contains("points"), "{}: {refused}", driver.name);
+        }
+    });
+}
+
+/// A field that the device cannot bind is refused before anything is made for it, by what it would take.
+#[test]
+fn a_field_larger_than_the_device_binds_is_refused() {
+    let positions = block([40, 32, 32], 0.1, Vec3::ZERO, 0.0);
+    let ball = |center: &Vec3| crate::support::sphere(*center, 0.1);
+    let particles = Particles { radius: 0.1, ellipsoids: positions.iter().map(ball).collect(), splash_count: 0 };
+    let points: Vec<_> = positions.iter().map(|p| Point { position: *p, density: 1.0, class: Class::Body }).collect();
+    let case = Case { particles, settings: settings(Field::default().room(1000.0), "two"), ..empty(0.1) };
+    each_driver(|driver| {
+        let session = &mut *driver.session.borrow_mut();
+        session.renderer.set_particles(&case.particles).expect("particles");
+        session.renderer.set_points(&points).expect("points");
+        let input = meniscus::FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null());
+        match session.frame(&input) {
+            Err(e) => assert!(e.to_string().contains("field nodes would take 163840"), "{}: {e}", driver.name),
+            Ok(_) => assert!(!driver.name.contains("Mesa"), "{}: lavapipe binds 128 MiB", driver.name),
         }
     });
 }
