@@ -7,8 +7,10 @@
 // Candidates for neighbours come in runs of the sorted order. Sorted cells are as wide as the support, so 3 x 3 runs of 3
 // cells (with YuTurk13's reach 5 x 5 of 5) hold all candidates. With RELATION_TABLE cells are as wide as the reach, and one run of the table holds them all.
 // Either way candidates are tested exactly, so that the neighbours are the same set.
+//
+// POINTS: a density field asks for number densities, and for no ellipsoids.
 #version 460
-// Compiled with any of: NEIGHBOURS, KEEP_CLASSES
+// Compiled with any of: NEIGHBOURS, KEEP_CLASSES, POINTS
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"
@@ -16,9 +18,15 @@ layout(local_size_x = PARTICLE_GROUP) in;
 #include "positions.glsl"
 layout(set = 0, binding = 3, std430) readonly buffer OrderBlock { uint at[]; } order;
 layout(set = 0, binding = 4, std430) readonly buffer SortedBlock { float at[]; } sorted;
+#ifdef POINTS
+// Positions; w: their number density as a part of a filled body's, negative for a splash, 0 where there is nothing.
+layout(set = 0, binding = 12, std430) writeonly buffer PointBlock { vec4 at[]; } points;
+#else
 layout(set = 0, binding = 5, std430) writeonly buffer CenterBlock { float at[]; } centers;
 layout(set = 0, binding = 6, std430) writeonly buffer DiagonalBlock { float at[]; } diagonals;
 layout(set = 0, binding = 7, std430) writeonly buffer MixedBlock { float at[]; } mixed;
+layout(constant_id = 2) const bool YU_TURK = false; // which fit
+#endif
 layout(set = 0, binding = 8, std430) buffer CounterBlock { uint at[]; } counters;
 #ifdef KEEP_CLASSES
 layout(set = 0, binding = 9, std430) buffer ClassBlock { uint at[]; } last_classes; // 0 splash, 1 body, by id or input index
@@ -29,7 +37,6 @@ layout(constant_id = 3) const bool BY_ID = false;
 layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[]; } neighbours;
 #endif
 layout(constant_id = 1) const uint COUNTERS = 0; // slot of its first counter
-layout(constant_id = 2) const bool YU_TURK = false; // which fit
 
 uint count() { return prepare.count; }
 vec3 sorted_position(uint k) { return vec3(sorted.at[3u * k], sorted.at[3u * k + 1u], sorted.at[3u * k + 2u]); }
@@ -124,6 +131,7 @@ vec4 spline(vec4 q) {
     return 2.0 * far * far * far - 8.0 * near * near * near;
 }
 
+#ifndef POINTS
 // Eigenvalues and eigenvectors (columns) of a symmetric matrix, in no order: cyclic Jacobi rotations.
 void eigen(inout mat3 a, out mat3 v) {
     v = mat3(1.0);
@@ -148,10 +156,24 @@ void eigen(inout mat3 a, out mat3 v) {
     }
 }
 
+#endif
+
 // A vector for each of the particles that are taken together.
 struct Vectors { vec4 x, y, z; };
 vec3 of(Vectors v, uint b) { return vec3(v.x[b], v.y[b], v.z[b]); }
 
+#ifdef POINTS
+// What is summed over the neighbours of each: whole numbers, so that the order of the input does not show.
+struct Sums { uvec4 density; };
+const float DENSITY_ONE = 262144.0;
+const uint MOST_AT_ONCE = 4096u, MOST_DENSITY = 0x7fffffffu;
+
+void add(inout Sums s, bvec4 near, uint many, Vectors o, vec4 squared) {
+    vec4 d = sqrt(mix(vec4(prepare.support * prepare.support), squared, near));
+    uvec4 weight = uvec4(spline(d * (1.0 / prepare.support)) * DENSITY_ONE + 0.5);
+    s.density = min(s.density + min(many, MOST_AT_ONCE) * weight, MOST_DENSITY);
+}
+#else
 // What is summed over the neighbours of each, offsets measured from it.
 struct Sums {
     uvec4 number;
@@ -181,6 +203,9 @@ void add(inout Sums s, bvec4 near, uint many, Vectors o, vec4 squared) {
     s.mixed_part.z += y * o.z;
 }
 
+#endif
+
+#ifndef POINTS
 void write(uint k, vec3 center, vec3 diagonal, vec3 mixed_part) {
     for (uint a = 0u; a < 3u; ++a) {
         centers.at[3u * k + a] = center[a];
@@ -188,6 +213,8 @@ void write(uint k, vec3 center, vec3 diagonal, vec3 mixed_part) {
         mixed.at[3u * k + a] = mixed_part[a];
     }
 }
+
+#endif
 
 // What has been counted here, added up once at the end.
 // What becomes of particles; counted as such from COUNTERS on.
@@ -212,6 +239,7 @@ bool classify(uint k, float relative) {
     return body;
 }
 
+#ifndef POINTS
 void write_sphere(uint k, vec3 center, uint why) {
     note(why);
     // The sign says which class.
@@ -269,6 +297,17 @@ void write_yu_turk(uint k, vec3 center, Sums s, uint b) {
     write_ellipsoid(k, center + prepare.smoothing / prepare.radius * mean, v, min(wanted, vec3(prepare.longest_axis)));
 }
 
+#endif
+
+#ifdef POINTS
+// Class and density of particle k at x from its sum, that of component b.
+void finish(uint k, vec3 x, Sums s, uint b) {
+    float relative = float(s.density[b]) / (DENSITY_ONE * prepare.filled_density);
+    bool body = classify(k, relative);
+    note(body ? BODY : SPLASH);
+    points.at[k] = vec4(x, body ? relative : -relative);
+}
+#else
 // Class and ellipsoid of particle k at x from its sums, those of component b.
 void finish(uint k, vec3 x, Sums s, uint b) {
     vec3 origin = uintBitsToFloat(uvec3(extent.at[EXTENT_ORIGIN], extent.at[EXTENT_ORIGIN + 1], extent.at[EXTENT_ORIGIN + 2]));
@@ -284,6 +323,8 @@ void finish(uint k, vec3 x, Sums s, uint b) {
     else if (s.number[b] <= prepare.min_neighbours + 1u) write_sphere(k, center, FEW_NEIGHBOURS);
     else write_yu_turk(k, center, s, b);
 }
+
+#endif
 
 // Particles that are taken together: those ranked from `from` to before `next`.
 struct Batch {
@@ -360,8 +401,12 @@ void list(Batch b, bvec4 near, uint candidate) {
 
 // The sums over a batch's neighbours, from the candidates in `number` runs.
 Sums sum_over(Batch b, uint number) {
+#ifdef POINTS
+    Sums s = Sums(uvec4(0u));
+#else
     Vectors none = Vectors(vec4(0.0), vec4(0.0), vec4(0.0));
     Sums s = Sums(uvec4(0u), vec4(0.0), vec4(0.0), none, none, none);
+#endif
     // One loop over all runs: invocations whose runs differ in length stay together.
     uint run = 0u, j = runs[0].x, end = runs[0].y, step = step_of(runs[0]);
     while (true) {
@@ -398,7 +443,11 @@ void main() {
         for (uint c = 0u; c < SHAPE_RUN; ++c) listed[c] = 0u;
 #endif
         if (!finite(x)) {
+#ifdef POINTS
+            points.at[from] = vec4(0.0);
+#else
             write(from, vec3(0.0), vec3(0.0), vec3(0.0));
+#endif
 #ifdef NEIGHBOURS
             begin_list(from, 0u);
 #endif

@@ -5,15 +5,16 @@ use crate::{
     Error, Settings,
     device::Limits,
     input::{Background, EnvironmentShape},
-    layers::Surfaces,
+    layers::{Kind, Surfaces},
     method::Offers,
-    passes::{Arrays, compact, cull, extent, occlude, shape, sort},
+    passes::{Arrays, Points, compact, cull, extent, occlude, shape, sort},
     plan::{Home, Plan},
     scale::Scale,
     shader, smooth,
+    space::Space,
 };
 use ash::vk;
-use glam::Mat4;
+use glam::{Mat4, Vec3};
 
 /// The passes of one frame. What a scene does not need is not there: no splash particles, no splash maps; one refraction,
 /// no back maps; no particles at all, only the background.
@@ -23,31 +24,50 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
     let mut surfaces = Surfaces::default();
     if scene.count > 0 {
         plan.work_for(Home::Particles, "particles");
-        let particles = match &scene.prepare {
-            // From positions on the device: their box, their neighbours (Im16 §III), classes and ellipsoids (YuTurk13).
-            Some(p) => {
-                let extent = extent::record(&mut plan, scene, &p.constants);
-                let sorted = sort::record(&mut plan, scene, p, extent);
-                shape::record(&mut plan, scene, p, extent, &sorted)
-            }
-            None => Arrays::given(&mut plan),
-        };
+        match method.layers.member().kind() {
+            Kind::Maps(maps) => {
+                let particles = match &scene.prepare {
+                    // From positions on the device: their box, their neighbours (Im16 §III), classes and ellipsoids (YuTurk13).
+                    Some(p) => {
+                        let extent = extent::record(&mut plan, scene, &p.constants);
+                        let sorted = sort::record(&mut plan, scene, p, extent);
+                        shape::record(&mut plan, scene, p, extent, &sorted)
+                    }
+                    None => Arrays::given(&mut plan),
+                };
 
-        plan.work_for(Home::View, "visibility");
-        // Optics that upsample have the surfaces at half the picture's width and height (Cords08 §5).
-        plan.work_at(scene.scale());
-        // Which particles can show at all.
-        let bounds = scene.occlusion().then(|| occlude::record(&mut plan, scene, &particles));
-        let culled = cull::record(&mut plan, scene, &particles, bounds);
-        let drawn = compact::record(&mut plan, scene, &particles, &culled);
-        // The liquid's surfaces (Imai16 §4.2), the body's smoothed (Imai16 §4.3).
-        plan.work_for(Home::View, "layers");
-        let layered = method.layers.member().record(&mut plan, scene, &drawn);
-        plan.work_for(Home::View, "smooth");
-        plan.smoothing_steps = scene.smoothing_steps;
-        surfaces.body = layered.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
-        (surfaces.splash, surfaces.thickness, surfaces.speed) = (layered.splash, layered.thickness, layered.speed);
-        plan.work_at(Scale::Full);
+                plan.work_for(Home::View, "visibility");
+                // Optics that upsample have the surfaces at half the picture's width and height (Cords08 §5).
+                plan.work_at(scene.scale());
+                // Which particles can show at all.
+                let bounds = scene.occlusion().then(|| occlude::record(&mut plan, scene, &particles));
+                let culled = cull::record(&mut plan, scene, &particles, bounds);
+                let drawn = compact::record(&mut plan, scene, &particles, &culled);
+                // The liquid's surfaces (Imai16 §4.2), the body's smoothed (Imai16 §4.3).
+                plan.work_for(Home::View, "layers");
+                let layered = maps.record(&mut plan, scene, &drawn);
+                plan.work_for(Home::View, "smooth");
+                plan.smoothing_steps = scene.smoothing_steps;
+                surfaces.body = layered.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
+                (surfaces.splash, surfaces.thickness, surfaces.speed) =
+                    (layered.splash, layered.thickness, layered.speed);
+                plan.work_at(Scale::Full);
+            }
+            Kind::Field(field) => {
+                let points = match &scene.prepare {
+                    // The same without ellipsoids: nobody draws them.
+                    Some(p) => {
+                        let extent = extent::record(&mut plan, scene, &p.constants);
+                        let sorted = sort::record(&mut plan, scene, p, extent);
+                        shape::points(&mut plan, scene, p, extent, &sorted)
+                    }
+                    None => Points::given(&mut plan),
+                };
+                // A density field around them (Iwasaki06), whose level is the surface.
+                plan.work_for(Home::Particles, "field");
+                surfaces.field = Some(field.record(&mut plan, scene, &points));
+            }
+        }
     }
     #[cfg(feature = "inspect")]
     {
@@ -80,6 +100,8 @@ pub(crate) struct Scene<'a> {
     pub output: vk::Format,
     /// World to eye.
     pub eye: Mat4,
+    /// The liquid's own space; where the device prepares particles only its unit counts.
+    pub space: Space,
     /// Whether what each walk met is written too.
     pub walks: bool,
     /// Of smoothing only so many steps, if it has more.
@@ -130,6 +152,7 @@ impl<'a> Scene<'a> {
             background: Background::Environment,
             output: vk::Format::R32G32B32A32_SFLOAT,
             eye: Mat4::IDENTITY,
+            space: Space::new(1.0, Vec3::ZERO),
             walks: false,
             smoothing_steps: None,
             points: limits.point_size > 1.0,
@@ -156,7 +179,11 @@ impl<'a> Scene<'a> {
     /// buffer, everything is drawn.
     pub fn occlusion(&self) -> bool {
         let pixels: u64 = self.scale().size(self.size).map(u64::from).iter().product();
-        let wanted = self.settings.drawing.occlusion_culling && self.settings.method.layers.member().may_cull(self);
+        let may_cull = match self.settings.method.layers.member().kind() {
+            Kind::Maps(maps) => maps.may_cull(self),
+            Kind::Field(_) => false,
+        };
+        let wanted = self.settings.drawing.occlusion_culling && may_cull;
         self.body && wanted && 8 * pixels <= self.storage_size
     }
 

@@ -101,7 +101,8 @@ pub struct FrameInput<'a> {
     /// Host's own environment. One of the two is always needed; without this one it is that of
     /// [`crate::Renderer::set_environment`].
     pub environment: Option<EnvironmentInput>,
-    /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it.
+    /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it. A density field
+    /// ([`crate::layers::field`]) knows by itself.
     pub eye_inside: bool,
     /// Output, of the format given to [`crate::Renderer::new`] and the size given to [`crate::Renderer::resize`], in
     /// `COLOR_ATTACHMENT_OPTIMAL` before and after.

@@ -98,7 +98,7 @@ pub use input::{Background, EnvironmentInput, EnvironmentShape, FrameInput, Scen
 pub use method::{Method, PRESETS, Preset};
 pub use optics::Fresnel;
 pub use parameters::{Parameter, Parameters};
-pub use particles::{Class, Ellipsoid, Particles};
+pub use particles::{Class, Ellipsoid, Particles, Point};
 pub use recorder::PlanEntry;
 pub use renderer::Renderer;
 pub use settings::{Camera, Drawing, Liquid, Settings};

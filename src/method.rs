@@ -25,6 +25,8 @@ impl Default for Method {
 /// What layers have to offer, and smoothing and optics ask for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Offers {
+    /// Maps of depths in a view.
+    pub maps: bool,
     /// The far side of the liquid.
     pub backs: bool,
     /// Normals of the particles' own surfaces.
@@ -39,7 +41,8 @@ pub(crate) struct Offers {
 }
 
 impl Offers {
-    const WORDS: [&'static str; 5] = [
+    const WORDS: [&'static str; 6] = [
+        "maps of depths",
         "the far side of the liquid",
         "the particles' own normals",
         "the liquid's thickness",
@@ -47,13 +50,14 @@ impl Offers {
         "the particles' speeds",
     ];
 
-    fn all(self) -> [bool; 5] {
-        [self.backs, self.normals, self.thickness, self.half, self.speeds]
+    fn all(self) -> [bool; 6] {
+        [self.maps, self.backs, self.normals, self.thickness, self.half, self.speeds]
     }
 
     /// What either of two asks for.
     fn or(self, b: Offers) -> Offers {
         Offers {
+            maps: self.maps || b.maps,
             backs: self.backs || b.backs,
             normals: self.normals || b.normals,
             thickness: self.thickness || b.thickness,

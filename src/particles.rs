@@ -22,6 +22,17 @@ pub struct Ellipsoid {
     pub axes: Mat3,
 }
 
+/// A particle as a density field takes it ([`crate::layers::field`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Where it is, in world units.
+    pub position: Vec3,
+    /// Its number density, as a part of a filled body's.
+    pub density: f32,
+    /// A splash is a ball beside the field.
+    pub class: Class,
+}
+
 /// Everything a frame draws: splash particles first, then the body's, each in canonical order
 /// ([`crate::prepare::prepare`] makes it so), which makes the image independent of the order of the input.
 #[derive(Clone, Debug, PartialEq)]

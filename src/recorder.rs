@@ -26,6 +26,8 @@ pub(crate) struct Externals {
     pub particles: [vk::Buffer; 3],
     /// How fast they are, where the host said so.
     pub speeds: vk::Buffer,
+    /// What a density field is made of, where the host said so.
+    pub points: vk::Buffer,
     pub environment: (vk::ImageView, vk::ImageLayout),
     pub scene: Option<SceneInput>,
     pub output: vk::ImageView,
@@ -298,6 +300,7 @@ impl Recorder<'_> {
             Made::Given(External::Diagonals) => all(diagonals),
             Made::Given(External::Mixed) => all(mixed),
             Made::Given(External::Speeds) => all(self.externals.speeds),
+            Made::Given(External::Points) => all(self.externals.points),
             _ => match self.own(target)? {
                 Resource::Buffer(b) => all(b.handle),
                 Resource::Image(_) => Err(absent("recording", self.plan.resource(target).name)),

@@ -44,6 +44,8 @@ pub struct Renderer {
     particles: Option<[Buffer; 3]>,
     /// How fast they are.
     speeds: Option<Buffer>,
+    /// What a density field is made of.
+    points: Option<Buffer>,
     scene: SceneBounds,
     environment: Option<Image>,
     pub(crate) barriers: Vec<PlanEntry>,
@@ -100,6 +102,7 @@ impl Renderer {
             frame: 0,
             particles: None,
             speeds: None,
+            points: None,
             scene: SceneBounds {
                 space: Space::new(1.0, Vec3::ZERO),
                 splash: 0,
@@ -152,6 +155,7 @@ impl Renderer {
         (scene.output, scene.background) = (self.output, input.background);
         scene.environment = input.environment.map_or(EnvironmentShape::Equirect, |e| e.shape);
         (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
+        scene.space = input.positions.map_or(self.scene.space, |p| Space::new(p.radius, Vec3::ZERO));
         if let Some(p) = &input.positions {
             self.fill(&mut scene, Amount::OnDevice(p))?;
         }
@@ -180,20 +184,22 @@ impl Renderer {
         Ok(())
     }
 
-    /// Refuses particles on the device whose buffers it cannot bind.
-    fn check_bindings(&self, plan: &Plan, p: &DevicePositions) -> Result<(), Error> {
+    /// Refuses particles whose buffers the device cannot bind.
+    fn check_bindings(&self, plan: &Plan, count: u32, positions: Option<&DevicePositions>) -> Result<(), Error> {
         let largest = self.limits.storage_size;
-        let asked = |stride| BINDING_ALIGNMENT + stride * u64::from(p.count);
-        let given =
-            [("positions (host's)", asked(p.stride)), ("ids (host's)", p.ids.map_or(0, |ids| asked(ids.stride)))];
+        let asked = |stride| BINDING_ALIGNMENT + stride * u64::from(count);
+        let given = positions.into_iter().flat_map(|p| {
+            [("positions (host's)", asked(p.stride)), ("ids (host's)", p.ids.map_or(0, |ids| asked(ids.stride)))]
+        });
+        let entries = positions.map_or(0, DevicePositions::entries);
         let buffers = plan.resources.iter().filter_map(|r| match r.made {
             Made::Own(Spec::Buffer { bytes, .. }) => Some((r.name, bytes)),
             _ => None,
         });
         for (name, bytes) in buffers.chain(given) {
-            if bytes > largest || p.entries() > u64::from(u32::MAX) {
+            if bytes > largest || entries > u64::from(u32::MAX) {
                 let remedy = format!("{name} would take {bytes} bytes; this device binds {largest} at most");
-                return Err(Error::parameter("particles", p.count, remedy));
+                return Err(Error::parameter("particles", count, remedy));
             }
         }
         Ok(())
@@ -251,6 +257,7 @@ impl Renderer {
             }
         }
         self.check_speeds(&scene)?;
+        self.check_points(&scene)?;
         let mut block = input.camera.uniforms(input.settings, self.size, &space, bounds);
         if let Some(p) = &input.positions {
             // In the preparation's units; the extent pass moves the origin and goes on to radii.
@@ -270,9 +277,7 @@ impl Renderer {
             p.anew = kept != self.last_classes;
         }
         let plan = frame::plan(&scene)?;
-        if let Some(p) = &input.positions {
-            self.check_bindings(&plan, p)?;
-        }
+        self.check_bindings(&plan, scene.count, input.positions.as_ref())?;
         input.check_handles()?;
         check_memory(&self.host, &self.limits, &self.tables, &plan)?;
         self.pipelines.make(&self.host, plan.recipes())?;
@@ -312,6 +317,7 @@ impl Renderer {
             ids,
             particles: particles.map_or([vk::Buffer::null(); 3], |b| b.each_ref().map(|b| b.handle)),
             speeds: self.speeds.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
+            points: self.points.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
             environment: (environment.view, environment.layout),
             scene: input.scene,
             output: input.output,
@@ -382,7 +388,8 @@ impl Renderer {
             table.retire_all(&mut self.retired, 0);
         }
         self.retired.collect(&self.host, u64::MAX);
-        self.particles.take().into_iter().flatten().chain(self.speeds.take()).for_each(|mut b| b.destroy(&self.host));
+        let given = self.particles.take().into_iter().flatten().chain(self.speeds.take()).chain(self.points.take());
+        given.for_each(|mut b| b.destroy(&self.host));
         if let Some(mut i) = self.environment.take() {
             i.destroy(&self.host);
         }

@@ -71,6 +71,13 @@ Ray in_view(vec3 origin, vec3 dir, float reach) {
     return ray;
 }
 
+// Whether a point is seen, as far as the view goes.
+bool in_sight(vec3 x) {
+    if (-x.z < frame.near) return false;
+    vec2 p = project(x);
+    return all(greaterThanEqual(p, vec2(0.0))) && all(lessThan(p, frame.size));
+}
+
 // A ray as far as it stays in the view and in the box around the liquid.
 Ray trace(vec3 origin, vec3 dir) {
     mat3 from_eye = transpose(mat3(frame.view));

@@ -10,35 +10,7 @@ vec3 position(uint i) {
     return prepare.unit_scale * vec3(positions.at[at], positions.at[at + 1u], positions.at[at + 2u]);
 }
 
-bool finite(vec3 x) { return !any(isnan(x)) && !any(isinf(x)); }
-
-// p + e = a b exactly (Dekker): what rounding leaves of a product.
-vec2 two_product(float a, float b) {
-    precise float p = a * b;
-    precise float sa = 4097.0 * a, ha = sa - (sa - a), la = a - ha;
-    precise float sb = 4097.0 * b, hb = sb - (sb - b), lb = b - hb;
-    precise float e = ((ha * hb - p) + ha * lb + la * hb) + la * lb;
-    return vec2(p, e);
-}
-
-// s + e = a + b exactly (Knuth).
-vec2 two_sum(float a, float b) {
-    precise float s = a + b, t = s - a;
-    precise float e = (a - (s - t)) + (b - t);
-    return vec2(s, e);
-}
-
-// floor(x / edge), exactly: a rounded quotient, mended by its exact remainder. Beyond 2^29 cells all is one cell.
-int cell_of(float x, float edge) {
-    float q = floor(x / edge);
-    if (!(abs(q) < float(FURTHEST_CELL))) return q < 0.0 ? -FURTHEST_CELL : FURTHEST_CELL;
-    vec2 p = two_product(q, edge);
-    precise float rest = (x - p.x) - p.y, above = (rest - edge);
-    int cell = int(q);
-    if (rest < 0.0) --cell;
-    else if (above >= 0.0) ++cell;
-    return cell;
-}
+#include "cells.glsl"
 
 ivec3 first_cell() { return ivec3(extent.at[EXTENT_FIRST_CELL], extent.at[EXTENT_FIRST_CELL + 1], extent.at[EXTENT_FIRST_CELL + 2]); }
 ivec3 last_cell() { return ivec3(extent.at[EXTENT_LAST_CELL], extent.at[EXTENT_LAST_CELL + 1], extent.at[EXTENT_LAST_CELL + 2]); }

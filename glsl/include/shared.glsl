@@ -244,6 +244,81 @@ struct Prepare {
     uint kept_classes;         // classes that are kept: one for each id, or for each particle
 };
 
+// The density field (docs/methods.md, "Density field"). Nodes along an edge of a brick, as a power of two, and in all of it.
+#define FIELD_BRICK_BITS 2
+#define FIELD_BRICK 4
+#define FIELD_NODES 64
+// What a filled body's density is in the whole numbers that nodes hold.
+#define FIELD_ONE 262144
+// A particle whose number density exceeds that of a filled body so many times counts as one of so much,
+#define FIELD_DENSEST 1.2
+// unless that is less than this part of its own: crowds on one spot, whose sum would outgrow a node.
+#define FIELD_CROWD 0.015625
+// Slots of the directory that are looked at for one brick, at most.
+#define FIELD_PROBES 128
+// A slot of the directory is 0 where it is free; else the number of its brick, and from bit FIELD_FLAGS on what there is in that, and from
+// bit FIELD_TAG on some bits of its hash, never all 0. Bricks without room have the number 0, and nodes of 0.
+#define FIELD_FLAGS 24
+#define FIELD_TAG 27
+// Numbers of bricks end here.
+#define FIELD_MOST_BRICKS 16777215
+// Some of a brick's cells hold the surface.
+#define FIELD_SURFACE 1
+// Some of its nodes are inside, or of those next to them.
+#define FIELD_INSIDE 2
+// There are balls in it.
+#define FIELD_BALLS 4
+// Words of a brick's record: its slot; the numbers of the seven bricks next to it whose nodes its cells have, by which of x, y and z is
+// larger there; one bit for each of its cells that holds the surface; its first ball, from 1 on; its coordinates.
+#define FIELD_RECORD 14
+#define FIELD_CELLS 8
+#define FIELD_FIRST_BALL 10
+#define FIELD_PLACE 11
+// Edge of a tile of the view for which it is known between which depths the field is, in pixels.
+#define FIELD_TILE 8
+// Bricks and cells that a ray is followed through in one go, at most.
+#define FIELD_STEPS 4096
+// Balls of one brick that are looked at.
+#define FIELD_MOST_BALLS 4096
+// Halvings that narrow a root, of the way through a cell.
+#define FIELD_HALVINGS 18
+// How far from its wall a ray goes on, on its own side, in spacings.
+#define FIELD_NUDGE 0.002
+// What rounding leaves of a ball's square, as a part of it, and of the way from one to itself, in spacings.
+#define BALL_ROUNDING 0.001
+#define BALL_START 0.001
+
+// Push constants of the passes that build it. Points and lengths are in the units of the preparation (Prepare).
+struct FieldBuild {
+    uint count;         // points
+    uint capacity;      // bricks that there is room for, number 0 among them, which is empty
+    uint slots;         // of the directory, a power of two
+    uint ball_capacity; // entries of balls in bricks that there is room for
+    float spacing;      // from node to node
+    float reach;        // support of the kernel, in spacings
+    float unit;         // of a weight of 1, in whole numbers of a node
+    float ball;         // radius of a ball, in spacings
+    uint level;         // the surface's, in whole numbers
+    float origin_x;     // of the liquid's own space, unless the device has found it
+    float origin_y;
+    float origin_z;
+};
+
+// What the field's readers know of it.
+struct FieldHead {
+    uint groups_x; // one group for each brick
+    uint groups_y;
+    uint groups_z;
+    uint bricks;   // there are, number 0 not counted
+    uint balls;    // entries of balls in bricks
+    uint base_x;   // node at or before the origin of the liquid's own space, as integers
+    uint base_y;
+    uint base_z;
+    float part_x;  // how far beyond it the origin lies, in spacings
+    float part_y;
+    float part_z;
+};
+
 // How a look-up is moved: by the normal times T; to where the bent ray's direction vanishes, with an index that grows with T;
 // by the bent ray's lateral components.
 #define LOOKUP_NORMAL 0

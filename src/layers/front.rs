@@ -5,7 +5,7 @@
 pub mod twin;
 
 use super::{
-    Body, Layered, Layering,
+    Body, Kind, Layered, Layering, Mapping,
     splat::{classes, depth_test, particles, surface},
     split::BODY,
 };
@@ -27,9 +27,15 @@ parameters! {
 
 impl Layering for Front {
     fn offers(&self) -> Offers {
-        Offers { backs: false, normals: true, thickness: true, half: true, speeds: true }
+        Offers { maps: true, backs: false, normals: true, thickness: true, half: true, speeds: true }
     }
 
+    fn kind(&self) -> Kind<'_> {
+        Kind::Maps(self)
+    }
+}
+
+impl Mapping for Front {
     fn may_cull(&self, scene: &Scene) -> bool {
         // What is hidden counts for the thickness.
         !scene.asks().thickness

@@ -1,5 +1,6 @@
 //! Which surfaces are kept of the particles: maps of linear depth and normals, nearest fronts and farthest backs.
 
+pub mod field;
 pub mod front;
 pub mod nearest_farthest;
 mod splat;
@@ -19,6 +20,7 @@ family! {
         Split(split) = "split",
         NearestFarthest(nearest_farthest) = "nearest-farthest",
         Front(front) = "front",
+        Field(field) = "field",
     }
 }
 
@@ -26,6 +28,20 @@ family! {
 pub(crate) trait Layering {
     /// What its maps can be asked for.
     fn offers(&self) -> Offers;
+    /// What they are.
+    fn kind(&self) -> Kind<'_>;
+}
+
+/// What layers are.
+pub(crate) enum Kind<'a> {
+    /// Maps of a view, of particles drawn.
+    Maps(&'a dyn Mapping),
+    /// A field around the particles, whatever the view.
+    Field(&'a field::Field),
+}
+
+/// Layers that are maps of a view.
+pub(crate) trait Mapping {
     /// Whether particles of the body that others hide may be left out.
     fn may_cull(&self, scene: &Scene) -> bool;
     /// Draws them.
@@ -71,6 +87,8 @@ pub(crate) struct Surfaces {
     pub thickness: Option<Target>,
     /// As of [`Layered::speed`].
     pub speed: Option<Target>,
+    /// Where the surface is that of a density field.
+    pub field: Option<field::Volume>,
 }
 
 /// Maps of one class. Layer 0 is the nearest front, layer 1, if there is one, the farthest back.

@@ -5,7 +5,7 @@
 pub mod twin;
 
 use super::{
-    Body, Layered, Layering,
+    Body, Kind, Layered, Layering, Mapping,
     splat::{classes, particles},
 };
 use crate::{
@@ -25,9 +25,15 @@ parameters! {
 
 impl Layering for NearestFarthest {
     fn offers(&self) -> Offers {
-        Offers { backs: true, ..Offers::default() }
+        Offers { maps: true, backs: true, ..Offers::default() }
     }
 
+    fn kind(&self) -> Kind<'_> {
+        Kind::Maps(self)
+    }
+}
+
+impl Mapping for NearestFarthest {
     fn may_cull(&self, _: &Scene) -> bool {
         // A particle is drawn once for both sides, so one that shows on either has to be there.
         false

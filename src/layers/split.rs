@@ -1,7 +1,7 @@
 //! Splashes apart from the body: four surfaces, two of each (Imai16 §4.2).
 
 use super::{
-    Body, Layered, Layering,
+    Body, Kind, Layered, Layering, Mapping,
     splat::{self, Names},
 };
 use crate::{
@@ -24,9 +24,15 @@ pub(super) const BODY: Names =
 
 impl Layering for Split {
     fn offers(&self) -> Offers {
-        Offers { backs: true, normals: true, ..Offers::default() }
+        Offers { maps: true, backs: true, normals: true, ..Offers::default() }
     }
 
+    fn kind(&self) -> Kind<'_> {
+        Kind::Maps(self)
+    }
+}
+
+impl Mapping for Split {
     fn may_cull(&self, _: &Scene) -> bool {
         true
     }

@@ -36,7 +36,7 @@ parameters! {
 
 impl Shading for InstantLiquids {
     fn asks(&self) -> Offers {
-        Offers { half: self.half_resolution, speeds: self.spray > 0.0, ..Offers::default() }
+        Offers { maps: true, half: self.half_resolution, speeds: self.spray > 0.0, ..Offers::default() }
     }
 
     fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {

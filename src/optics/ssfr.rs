@@ -22,7 +22,7 @@ parameters! {
 
 impl Shading for Ssfr {
     fn asks(&self) -> Offers {
-        Offers { thickness: true, ..Offers::default() }
+        Offers { maps: true, thickness: true, ..Offers::default() }
     }
 
     fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {

@@ -21,7 +21,7 @@ parameters! {
 
 impl Shading for SsfrIndex {
     fn asks(&self) -> Offers {
-        Offers { thickness: true, ..Offers::default() }
+        Offers { maps: true, thickness: true, ..Offers::default() }
     }
 
     fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {

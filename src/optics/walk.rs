@@ -1,6 +1,6 @@
 //! The walk of each view ray through the liquid, and its colour (`glsl/optics/walk.frag`; Imai16 §4.4, §4.5).
 
-use super::{Fresnel, walls};
+use super::{Fresnel, field_walk, walls};
 use crate::{
     frame::Scene,
     input::{Background, EnvironmentShape},
@@ -52,6 +52,47 @@ impl Walk {
     }
 
     pub(super) fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
+        let draws = match &surfaces.field {
+            Some(field) => {
+                field_walk::draws(plan, scene, field, |plan, call, empty| self.light(plan, scene, call, !empty))
+            }
+            None => {
+                let call = self.maps(plan, scene, surfaces);
+                vec![(self.light(plan, scene, call, true), Vertices::Direct(3))]
+            }
+        };
+        let output = plan.given(External::Output(scene.output));
+        let mut rendering = Rendering::into(output, 0).keeping(scene.background == Background::Host);
+        if scene.walks {
+            for name in ["walk (debug)", "final direction (debug)"] {
+                rendering = rendering.and(plan.flat(name, Format::R32G32B32A32_SFLOAT), 0);
+            }
+        }
+        plan.render("walk", rendering, draws);
+    }
+
+    /// What light a ray brings back, and if it `walks` what becomes of it on the way.
+    fn light(&self, plan: &mut Plan, scene: &Scene, call: Call, walks: bool) -> Call {
+        let mut call = call
+            .read("environment", plan.given(External::Environment))
+            .constant("ENCODE_SRGB", scene.encode_srgb())
+            .constant("HOST_BACKGROUND", scene.background == Background::Host);
+        if walks {
+            call = call
+                .constant("REFRACTIONS", self.refractions)
+                .constant("INTERNAL_REFLECTIONS", self.internal_reflections)
+                .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact);
+        }
+        if scene.has_scene {
+            call = call
+                .read("scene_color", plan.given(External::SceneColor))
+                .read("scene_depth", plan.given(External::SceneDepth));
+        }
+        call
+    }
+
+    /// The walk through maps of depths.
+    fn maps(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) -> Call {
         // Of a class without particles the shader does not look at its maps, but something has to be bound: the other
         // class's, or without any particles what no shader has written.
         let any = surfaces.body.or(surfaces.splash).unwrap_or_else(|| placeholder(plan));
@@ -62,37 +103,21 @@ impl Walk {
             false => walls::placeholder(plan),
         };
 
-        let has_scene = scene.has_scene;
-        let cube = scene.environment == EnvironmentShape::Cube;
-        let variant = usize::from(scene.walks) + 2 * usize::from(has_scene) + 4 * usize::from(cube);
-        let mut call = Call::draw(&VIEW_VERT, &WALK_FRAG[variant])
+        Call::draw(&VIEW_VERT, &WALK_FRAG[variant(scene)])
             .read("walls", walls)
             .read("body_depth", body.depth)
             .read("body_normal", body.normal)
             .read("splash_depth", splash.depth)
             .read("splash_normal", splash.normal)
-            .read("environment", plan.given(External::Environment))
-            .constant("REFRACTIONS", self.refractions)
-            .constant("INTERNAL_REFLECTIONS", self.internal_reflections)
-            .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact)
             .constant("HAS_SPLASH", surfaces.splash.is_some())
             .constant("HAS_BODY", surfaces.body.is_some())
-            .constant("ENCODE_SRGB", scene.encode_srgb())
-            .constant("HOST_BACKGROUND", scene.background == Background::Host);
-        if has_scene {
-            call = call
-                .read("scene_color", plan.given(External::SceneColor))
-                .read("scene_depth", plan.given(External::SceneDepth));
-        }
-        let output = plan.given(External::Output(scene.output));
-        let mut rendering = Rendering::into(output, 0).keeping(scene.background == Background::Host);
-        if scene.walks {
-            for name in ["walk (debug)", "final direction (debug)"] {
-                rendering = rendering.and(plan.flat(name, Format::R32G32B32A32_SFLOAT), 0);
-            }
-        }
-        plan.render("walk", rendering, vec![(call, Vertices::Direct(3))]);
     }
+}
+
+/// Which of a walk's shaders.
+pub(super) fn variant(scene: &Scene) -> usize {
+    let cube = scene.environment == EnvironmentShape::Cube;
+    usize::from(scene.walks) + 2 * usize::from(scene.has_scene) + 4 * usize::from(cube)
 }
 
 /// Maps that nothing looks at.

@@ -36,6 +36,21 @@ impl Arrays {
     }
 }
 
+/// Particles as a density field takes them: where they are, and how dense.
+#[derive(Clone, Copy)]
+pub(crate) struct Points {
+    pub points: Target,
+    /// What the extent pass has found, if the device prepares them.
+    pub extent: Option<Target>,
+}
+
+impl Points {
+    /// Those that the host prepared.
+    pub fn given(plan: &mut Plan) -> Points {
+        Points { points: plan.given(External::Points), extent: None }
+    }
+}
+
 /// What the cull pass says of them.
 #[derive(Clone, Copy)]
 pub(crate) struct Culled {
@@ -62,7 +77,7 @@ fn rectangle(groups: u32) -> Groups {
 }
 
 /// The rectangle of groups with an invocation for each particle.
-fn per_particle(count: u32) -> Groups {
+pub(crate) fn per_particle(count: u32) -> Groups {
     rectangle(count.div_ceil(PARTICLE_GROUP))
 }
 

@@ -1,6 +1,6 @@
 //! Number density, class and ellipsoid of each particle (`glsl/shape.comp`; Imai16 §4.1, YuTurk13).
 
-use super::{Arrays, rectangle, sort::Sorted};
+use super::{Arrays, Points, rectangle, sort::Sorted};
 use crate::{
     frame::{Preparation, Scene},
     plan::{Call, External, Plan, Target},
@@ -21,6 +21,7 @@ pub(crate) const COUNTED: [&str; 7] = [
 /// What classes start as: as if all had been body.
 const BODY: u32 = 1;
 
+/// Classes, and ellipsoids for the body.
 pub(crate) fn record(
     plan: &mut Plan,
     scene: &Scene,
@@ -35,18 +36,47 @@ pub(crate) fn record(
         diagonals: array("particle shapes (diagonal)"),
         mixed: array("particle shapes (mixed)"),
     };
+    dispatch(plan, scene, preparation, extent, sorted, false, |call| {
+        call.write("centers", arrays.centers)
+            .write("diagonals", arrays.diagonals)
+            .write("mixed", arrays.mixed)
+            .constant("YU_TURK", preparation.yu_turk)
+    });
+    arrays
+}
+
+/// Classes, and densities in place of ellipsoids: for a density field.
+pub(crate) fn points(
+    plan: &mut Plan,
+    scene: &Scene,
+    preparation: &Preparation,
+    extent: Target,
+    sorted: &Sorted,
+) -> Points {
+    let points = plan.array("particle points", 16 * u64::from(scene.count));
+    dispatch(plan, scene, preparation, extent, sorted, true, |call| call.write("points", points));
+    Points { points, extent: Some(extent) }
+}
+
+fn dispatch(
+    plan: &mut Plan,
+    scene: &Scene,
+    preparation: &Preparation,
+    extent: Target,
+    sorted: &Sorted,
+    points: bool,
+    write: impl FnOnce(Call) -> Call,
+) {
+    let count = u64::from(scene.count);
     let listed = preparation.neighbours > 0;
     let by_id = preparation.kept.is_some_and(|kept| kept.by_id);
-    let mut call = Call::compute(&SHAPE_COMP[usize::from(listed) + 2 * usize::from(preparation.kept.is_some())])
+    let variant = usize::from(listed) + 2 * usize::from(preparation.kept.is_some()) + 4 * usize::from(points);
+    let mut call = write(Call::compute(&SHAPE_COMP[variant]))
         .read("extent", extent)
         .read("order", sorted.order)
         .read("sorted", sorted.positions)
-        .write("centers", arrays.centers)
-        .write("diagonals", arrays.diagonals)
-        .write("mixed", arrays.mixed)
         .counting(if by_id { &COUNTED } else { &COUNTED[..6] })
         .constant("RELATION_TABLE", preparation.constants.entries_per_particle != 1)
-        .constant("YU_TURK", preparation.yu_turk)
         .push_all(&preparation.constants);
     if let Some(kept) = preparation.kept {
         let classes =
@@ -60,5 +90,4 @@ pub(crate) fn record(
         call = call.write("neighbours", lists);
     }
     plan.dispatch("shape", call, rectangle(scene.count.div_ceil(SHAPE_RUN * PARTICLE_GROUP)));
-    arrays
 }

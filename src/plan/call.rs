@@ -327,8 +327,8 @@ fn fits(plan: &Plan, b: &Binding, target: Target) -> Result<(), String> {
         (Some(texels), Made::Given(External::Environment)) => !texels.uint,
         (None, Made::Own(Spec::Buffer { .. })) => true,
         (None, Made::Given(given)) => {
-            use External::{Centers, Diagonals, FrameBlock, Ids, Mixed, Positions, Speeds};
-            matches!(given, FrameBlock(_) | Positions | Ids | Centers | Diagonals | Mixed | Speeds)
+            use External::{Centers, Diagonals, FrameBlock, Ids, Mixed, Points, Positions, Speeds};
+            matches!(given, FrameBlock(_) | Positions | Ids | Centers | Diagonals | Mixed | Speeds | Points)
         }
         _ => false,
     };

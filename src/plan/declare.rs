@@ -85,6 +85,7 @@ impl Plan {
             External::Diagonals => ("particle shapes (diagonal)", Home::Particles),
             External::Mixed => ("particle shapes (mixed)", Home::Particles),
             External::Speeds => ("particle speeds", Home::Particles),
+            External::Points => ("particle points", Home::Particles),
             External::Environment => ("environment", Home::View),
             External::SceneColor => ("scene colour (host's)", Home::View),
             External::SceneDepth => ("scene depth (host's)", Home::View),

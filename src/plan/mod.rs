@@ -44,6 +44,7 @@ pub(crate) enum External {
     Diagonals,
     Mixed,
     Speeds,
+    Points,
     Environment,
     SceneColor,
     SceneDepth,

@@ -18,16 +18,19 @@ mod neighbours;
 #[cfg(feature = "inspect")]
 pub mod neighbours;
 mod options;
+mod points;
 mod spacing;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, Mat3, Vec3};
 
+pub(crate) use density::rest_density;
 pub use density::{DensityField, classify};
 pub use device::{DeviceIds, DevicePositions};
 pub use neighbours::Search;
 pub use options::{Fit, Options};
+pub use points::points;
 pub use spacing::estimate_radius;
 
 use crate::{

@@ -2,7 +2,7 @@
 
 use super::{
     HOMES, Renderer,
-    uploads::{PARTICLE_ARRAYS, SPEEDS},
+    uploads::{PARTICLE_ARRAYS, POINTS, SPEEDS},
 };
 use crate::{
     Error, Settings,
@@ -33,7 +33,7 @@ pub enum Amount<'a> {
 
 impl Renderer {
     /// Device memory that frames of a size take, resource by resource, before anything is allocated. Particles that the
-    /// host prepared are extra, 36 bytes each and 4 more with their speeds, and a static environment map, 16 bytes a texel.
+    /// host prepared are extra, 36 bytes each, 4 more with their speeds and 16 with their points, and a static environment map, 16 bytes a texel.
     pub fn memory_requirements(
         &self,
         size: [u32; 2],
@@ -54,6 +54,7 @@ impl Renderer {
         let particles = PARTICLE_ARRAYS.into_iter().zip(self.particles.iter().flatten());
         ledger.extend(particles.map(|(name, b)| entry(name, b.bytes, true)));
         ledger.extend(self.speeds.iter().map(|b| entry(SPEEDS, b.bytes, true)));
+        ledger.extend(self.points.iter().map(|b| entry(POINTS, b.bytes, true)));
         ledger.extend(self.environment.iter().map(|i| entry("environment", i.bytes, false)));
         ledger
     }

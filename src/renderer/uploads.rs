@@ -5,7 +5,8 @@ use crate::{
     Error, access,
     environment::Equirect,
     frame::Scene,
-    particles::Particles,
+    layers::{Kind, field::MOST_POINTS},
+    particles::{Class, Particles, Point},
     prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},
     space::{self, Space},
@@ -16,7 +17,7 @@ use gpu_allocator::MemoryLocation;
 
 impl Renderer {
     /// Gives the particles of the frames to come. The host's memory is copied; the last particles are kept until the
-    /// frames that draw them have completed. Speeds given before go with the last particles.
+    /// frames that draw them have completed. Speeds and points given before go with the last particles.
     pub fn set_particles(&mut self, particles: &Particles) -> Result<(), Error> {
         let count = particles.ellipsoids.len();
         if !space::RADII.contains(&particles.radius) {
@@ -71,6 +72,7 @@ impl Renderer {
         }
         let bounds = particles.bounds().unwrap_or_default();
         self.speeds.take().into_iter().for_each(|old| self.retire(Resource::Buffer(old)));
+        self.points.take().into_iter().for_each(|old| self.retire(Resource::Buffer(old)));
         self.scene = SceneBounds { space, splash: particles.splash_count, body: particles.body_count(), bounds };
         Ok(())
     }
@@ -93,6 +95,50 @@ impl Renderer {
             self.retire(Resource::Buffer(old));
         }
         Ok(())
+    }
+
+    /// Says where the particles of [`Renderer::set_particles`] are and how dense, for a density field
+    /// ([`crate::layers::field`]); [`crate::prepare::points`] makes them.
+    pub fn set_points(&mut self, points: &[Point]) -> Result<(), Error> {
+        let count = self.scene.splash + self.scene.body;
+        if points.len() != count {
+            return Err(Error::parameter("points", points.len(), format!("give one for each of {count} particles")));
+        }
+        let wrong = |p: &Point| !(p.position.is_finite() && p.density > 0.0 && p.density.is_finite());
+        if let Some(i) = points.iter().position(wrong) {
+            let remedy = "use finite positions, and finite densities above 0";
+            return Err(Error::parameter("points", format!("number {i} is {:?}", points[i]), remedy));
+        }
+        let (bytes, usage) = (POINT_BYTES * count.max(1) as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
+        if bytes > self.limits.storage_size {
+            let most = self.limits.storage_size / POINT_BYTES;
+            return Err(Error::parameter("points", count, format!("this device holds {most} at most")));
+        }
+        let mut buffer = Buffer::new(&self.host, POINTS, bytes, usage, MemoryLocation::CpuToGpu)?;
+        let unit = space::power_of_two(self.scene.space.radius as f32);
+        for (p, to) in points.iter().zip(buffer.mapped().chunks_exact_mut(POINT_BYTES as usize)) {
+            let density = if p.class == Class::Splash { -p.density } else { p.density };
+            to.copy_from_slice(bytemuck::bytes_of(&(p.position * unit).extend(density)));
+        }
+        if let Some(old) = self.points.replace(buffer) {
+            self.retire(Resource::Buffer(old));
+        }
+        Ok(())
+    }
+
+    /// Refuses a frame that needs points and has none, or too many.
+    pub(super) fn check_points(&self, scene: &Scene) -> Result<(), Error> {
+        let needed = matches!(scene.settings.method.layers.member().kind(), Kind::Field(_));
+        if needed && scene.count > MOST_POINTS {
+            let remedy = format!("a density field takes {MOST_POINTS} at most");
+            return Err(Error::parameter("particles", scene.count, remedy));
+        }
+        if !needed || scene.count == 0 || scene.prepare.is_some() || self.points.is_some() {
+            return Ok(());
+        }
+        let remedy =
+            "give where the particles are: prepare::points and Renderer::set_points, or prepare them on the device";
+        Err(Error::parameter("layers", scene.settings.method.layers.name(), remedy))
     }
 
     /// Refuses a frame that needs speeds and has none.
@@ -177,5 +223,8 @@ pub(super) const PARTICLE_ARRAYS: [&str; 3] =
 const ARRAY_BYTES: u64 = 12;
 /// A fourth holds how fast they are, where that is known.
 pub(super) const SPEEDS: &str = "particle speeds";
+/// And one what a density field is made of: where each is, and how dense.
+pub(super) const POINTS: &str = "particle points";
+const POINT_BYTES: u64 = 16;
 /// Where indices of three floats each, or of a rectangle of work groups, would no longer fit 32 bits.
 const MOST_PARTICLES: u64 = 1 << 30;

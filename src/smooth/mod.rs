@@ -36,7 +36,7 @@ family! {
 pub(crate) trait Filter {
     /// What it asks of the layers.
     fn asks(&self) -> Offers {
-        Offers::default()
+        Offers { maps: true, ..Offers::default() }
     }
     /// Smooths the depths of all sides of the body; gives the target that holds the result, which may be the body's own.
     fn record(&self, plan: &mut Plan, body: &Body) -> Target;

@@ -3,6 +3,7 @@
 use super::Filter;
 use crate::{
     layers::Body,
+    method::Offers,
     parameters::parameters,
     plan::{Plan, Target},
 };
@@ -13,6 +14,10 @@ parameters! {
 }
 
 impl Filter for Unsmoothed {
+    fn asks(&self) -> Offers {
+        Offers::default()
+    }
+
     fn record(&self, _: &mut Plan, body: &Body) -> Target {
         body.depth
     }

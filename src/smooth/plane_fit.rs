@@ -56,7 +56,7 @@ fn tile(reach: u32) -> [u32; 2] {
 
 impl Filter for PlaneFit {
     fn asks(&self) -> Offers {
-        Offers { normals: true, ..Offers::default() }
+        Offers { maps: true, normals: true, ..Offers::default() }
     }
 
     fn record(&self, plan: &mut Plan, body: &Body) -> Target {

@@ -5,6 +5,7 @@ pub mod background;
 pub mod compact;
 pub mod cull;
 pub mod extent;
+pub mod field_walk;
 pub mod normal;
 pub mod occlude;
 pub mod optics;

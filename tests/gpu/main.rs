@@ -9,6 +9,8 @@ mod compact;
 mod cull;
 mod drivers;
 mod extent;
+mod field;
+mod field_walk;
 mod goldens;
 mod half;
 mod host;

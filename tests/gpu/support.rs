@@ -3,9 +3,10 @@
 pub use crate::drivers::each_driver;
 use glam::{Mat3, Vec3};
 use meniscus::{
-    Background, Camera, Ellipsoid, FrameInput, Particles, SceneInput, Settings,
+    Background, Camera, Class, Ellipsoid, FrameInput, Particles, Point, SceneInput, Settings,
     host::{Gpu, Instance, Session, Upload},
     inspect::{self, Inspection, Walk},
+    layers::Layers,
     optics::{Optics, four::Four, one::One, two::Two},
     prepare::{self, DeviceIds, DevicePositions},
     shader::Frame,
@@ -96,22 +97,43 @@ impl<'a> Driver<'a> {
         self.session.into_inner().end();
     }
 
+    /// Gives the case's particles, with what its layers ask for.
+    fn give(&self, case: &Case) {
+        let renderer = &mut self.session.borrow_mut().renderer;
+        renderer.set_particles(&case.particles).expect("particles");
+        if let Layers::Field(_) = case.settings.method.layers {
+            let p = &case.particles;
+            let positions: Vec<Vec3> = p.ellipsoids.iter().map(|e| e.center).collect();
+            let class = |i| if i < p.splash_count { Class::Splash } else { Class::Body };
+            let classes: Vec<Class> = (0..positions.len()).map(class).collect();
+            let input = prepare::Input::new(&positions, p.radius).classes(Some(&classes));
+            renderer.set_points(&prepare::points(&input, &Default::default()).expect("points")).expect("points");
+        }
+    }
+
+    /// Renders a case of which the points are given, too.
+    pub fn shoot_points(&self, case: &Case, points: &[Point]) -> Shot {
+        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        self.session.borrow_mut().renderer.set_points(points).expect("points");
+        self.shoot_input(case, Inspection::default(), &|input| input)
+    }
+
     /// Renders a case (with `debug` targets) and reads everything back.
     pub fn shoot(&self, case: &Case) -> Shot {
-        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        self.give(case);
         self.shoot_input(case, Inspection::default(), &|input| input)
     }
 
     /// The same of a frame whose smoothing ends after so many steps.
     pub fn shoot_step(&self, case: &Case, steps: u32) -> Shot {
-        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        self.give(case);
         let inspection = Inspection { smoothing_steps: Some(steps), ..Inspection::default() };
         self.shoot_input(case, inspection, &|input| input)
     }
 
     /// The same of particles whose speeds are known.
     pub fn shoot_moving(&self, case: &Case, speeds: &[f32]) -> Shot {
-        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        self.give(case);
         self.session.borrow_mut().renderer.set_speeds(speeds).expect("speeds");
         self.shoot_input(case, Inspection::default(), &|input| input)
     }
@@ -154,7 +176,7 @@ impl<'a> Driver<'a> {
 
     /// The same before a scene of the host's.
     pub fn shoot_before(&self, case: &Case, scene: SceneInput, background: Background) -> Shot {
-        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        self.give(case);
         let mut shot =
             self.shoot_input(case, Inspection::default(), &|input| input.scene(scene).background(background));
         let p = case.camera.projection;
@@ -166,7 +188,7 @@ impl<'a> Driver<'a> {
 
     /// The same with another input.
     pub fn shoot_with(&self, case: &Case, change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>) -> Shot {
-        self.session.borrow_mut().renderer.set_particles(&case.particles).expect("particles");
+        self.give(case);
         self.shoot_input(case, Inspection::default(), change)
     }
 

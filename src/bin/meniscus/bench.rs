@@ -260,7 +260,7 @@ fn measure(
     let particles = &scene.particles;
     let (camera, eye, _) = picture.camera(scene)?;
     let settings = picture.frame_settings(particles)?;
-    let upload = scene.give(picture.preparer(), session)?;
+    let upload = scene.give(picture.preparer(), &settings, session)?;
     let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
     input.eye_inside = scene.inside(eye);
     input.positions = upload.as_ref().map(|u| scene.on_device(u));

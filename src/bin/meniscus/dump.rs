@@ -1,7 +1,7 @@
 //! `--dump`: the frame's maps as .npy, so that what smooths them, walks in them and shades can be recomputed from the dump
 //! alone.
 
-use crate::{choices, codes, options, outputs::Dump, render::Job};
+use crate::{choices, codes, dump_field, options, outputs::Dump, render::Job};
 use glam::{DMat4, DVec3, Mat4, Vec3};
 use meniscus::{
     host::Session,
@@ -73,6 +73,7 @@ pub fn write(folder: &Path, job: &Job, session: &mut Session) -> Result<()> {
     }
     out.array("color_linear", 3, session.picture()?.into_iter().flatten())?;
     out.dump.write("particles.npz", &particles(job)?)?;
+    dump_field::write(job, session, |name, bytes| Ok(out.dump.write(name, &bytes)?))?;
     if job.args.dump_neighbours {
         out.dump.write("neighbours.npz", &neighbours(job, session)?)?;
     }
@@ -131,7 +132,7 @@ impl Folder<'_> {
     }
 }
 
-fn npy<T: npyz::AutoSerialize>(shape: &[u64], data: impl Iterator<Item = T>) -> Result<Vec<u8>> {
+pub fn npy<T: npyz::AutoSerialize>(shape: &[u64], data: impl Iterator<Item = T>) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut bytes).begin_nd()?;
     writer.extend(data)?;

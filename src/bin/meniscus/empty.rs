@@ -16,7 +16,8 @@ pub fn explain(
     settings: &Settings,
     size: [u32; 2],
 ) -> Result<Option<String>, HostError> {
-    if particles.ellipsoids.is_empty() {
+    // What rays meet of a field no map says.
+    if particles.ellipsoids.is_empty() || session.renderer.spec("field head").is_some() {
         return Ok(None);
     }
     let surfaces = session.renderer.surfaces();

@@ -7,6 +7,7 @@ mod camera;
 mod choices;
 mod codes;
 mod dump;
+mod dump_field;
 mod empty;
 mod info;
 mod options;

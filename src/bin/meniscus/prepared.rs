@@ -1,8 +1,8 @@
 //! What the device prepared, read back for dumps and statistics.
 
-use glam::{DMat3, DVec3, Mat3, Vec3};
+use glam::{DMat3, DVec3, Mat3, Vec3, Vec4};
 use meniscus::{
-    Ellipsoid, Particles,
+    Class, Ellipsoid, Particles, Point,
     host::{HostError, Session},
     inspect,
     prepare::{Report, ellipsoids::eigen_symmetric},
@@ -28,6 +28,9 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     };
     let (centers, diagonals, mixed) =
         (array("particle centres")?, array("particle shapes (diagonal)")?, array("particle shapes (mixed)")?);
+    if let Some(points) = points(session, radius)? {
+        return from_points(session, radius, points);
+    }
     let order = order(session, centers.len())?;
     let sphere = Mat3::from_diagonal(Vec3::splat(radius * s::SPLASH_RADIUS));
     let space = words(session, "extent")?;
@@ -49,6 +52,34 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     }
     let splash_count = splash.len();
     let (ellipsoids, index) = splash.into_iter().chain(body).unzip();
+    let report = inspect::report(&session.counters()?);
+    Ok(Prepared { particles: Particles { radius, ellipsoids, splash_count }, report, index })
+}
+
+/// What the device made a density field of, in its order; `None` where it did not. What is not finite has no density.
+pub fn points(session: &mut Session, radius: f32) -> Result<Option<Vec<Point>>, HostError> {
+    let Some(words) = session.words("particle points", 0)? else { return Ok(None) };
+    let point = |w: &[u32]| {
+        let p = Vec4::from_slice(&[w[0], w[1], w[2], w[3]].map(f32::from_bits));
+        // A power of two rounds nothing.
+        let unit = 2f32.powi(-radius.log2().floor() as i32);
+        let class = if p.w < 0.0 { Class::Splash } else { Class::Body };
+        Point { position: p.truncate() / unit, density: p.w.abs(), class }
+    };
+    Ok(Some(words.chunks_exact(4).map(point).collect()))
+}
+
+/// Balls in place of ellipsoids, which nobody draws.
+fn from_points(session: &mut Session, radius: f32, points: Vec<Point>) -> Result<Prepared, HostError> {
+    let order = order(session, points.len())?;
+    let there = points.iter().zip(order).filter(|(p, _)| p.density > 0.0);
+    let (splash, body): (Vec<_>, Vec<_>) = there.partition(|(p, _)| p.class == Class::Splash);
+    let ball = |(p, index): (&Point, u32)| {
+        let radius = if p.class == Class::Splash { radius * s::SPLASH_RADIUS } else { radius };
+        (Ellipsoid { center: p.position, axes: Mat3::from_diagonal(Vec3::splat(radius)) }, index)
+    };
+    let splash_count = splash.len();
+    let (ellipsoids, index) = splash.into_iter().chain(body).map(ball).unzip();
     let report = inspect::report(&session.counters()?);
     Ok(Prepared { particles: Particles { radius, ellipsoids, splash_count }, report, index })
 }

@@ -167,7 +167,7 @@ fn shortest(value: f32) -> f64 {
 
 /// Renders and writes everything; says so if the picture shows none of the liquid.
 fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dyn std::error::Error>> {
-    let upload = job.scene.give(job.picture.preparer(), session)?;
+    let upload = job.scene.give(job.picture.preparer(), &job.settings, session)?;
     let (camera, settings) = (job.camera, job.settings);
     // The session has a canvas of its own.
     let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());

@@ -5,10 +5,11 @@ use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
-    Class, Ellipsoid, Particles,
+    Class, Ellipsoid, Particles, Point, Settings,
     host::{Session, Upload},
     io::particles::{Invalid, check_finite, read_bytes, read_within},
-    prepare::{self, DensityField, DevicePositions, Input, Options, Report, Search},
+    layers::Layers,
+    prepare::{self, DensityField, DevicePositions, Input, Options, PrepareError, Report, Search},
     shader,
 };
 use serde::{Deserialize, Serialize};
@@ -31,6 +32,8 @@ pub struct Scene {
     pub positions: Vec<Vec3>,
     /// Of the particles as drawn, where the CPU prepared them and the file has velocities.
     speeds: Option<Vec<f32>>,
+    /// The file's own, in its order.
+    classes: Option<Vec<Class>>,
     pub options: Options,
     density: Option<DensityField>,
 }
@@ -128,7 +131,19 @@ impl Scene {
         } else {
             None
         };
-        Ok(Scene { particles, report, origin, radius_source, dropped, prepare_ms, positions, speeds, options, density })
+        Ok(Scene {
+            particles,
+            report,
+            origin,
+            radius_source,
+            dropped,
+            prepare_ms,
+            positions,
+            speeds,
+            classes,
+            options,
+            density,
+        })
     }
 
     /// Positions that were made, not read.
@@ -146,13 +161,19 @@ impl Scene {
             prepare_ms,
             positions,
             speeds,
+            classes: None,
             options,
             density: None,
         })
     }
 
     /// Gives its particles to the renderer or, where the device prepares them, its positions in a buffer.
-    pub fn give<'a>(&self, prepare: Prepare, session: &mut Session<'a>) -> Result<Option<Upload<'a>>, Box<dyn Error>> {
+    pub fn give<'a>(
+        &self,
+        prepare: Prepare,
+        settings: &Settings,
+        session: &mut Session<'a>,
+    ) -> Result<Option<Upload<'a>>, Box<dyn Error>> {
         if prepare.on_device() {
             return Ok(Some(Upload::new(session.gpu, bytemuck::cast_slice(&self.positions))?));
         }
@@ -160,7 +181,16 @@ impl Scene {
         if let Some(speeds) = &self.speeds {
             session.renderer.set_speeds(speeds)?;
         }
+        if let Layers::Field(_) = settings.method.layers {
+            session.renderer.set_points(&self.points()?)?;
+        }
         Ok(None)
+    }
+
+    /// What a density field is made of, as the CPU prepares it.
+    pub fn points(&self) -> Result<Vec<Point>, PrepareError> {
+        let input = Input::new(&self.positions, self.particles.radius).classes(self.classes.as_deref());
+        prepare::points(&input, &self.options)
     }
 
     /// What [`Scene::give`] uploaded.

@@ -1,0 +1,231 @@
+// The walk of one view ray through the liquid that a density field and balls are, and the light it brings back: what walk.frag
+// does in maps, without a view. DEBUG, SCENE, CUBE as there. EMPTY: where there is no liquid.
+#version 460
+// Compiled with any of: DEBUG, SCENE, CUBE, EMPTY
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "shared.glsl"
+#include "frame.glsl"
+#include "optics.glsl"
+#include "field.glsl"
+#ifndef EMPTY
+layout(constant_id = 0) const uint REFRACTIONS = 4;
+layout(constant_id = 1) const uint INTERNAL_REFLECTIONS = 4;
+layout(constant_id = 2) const bool EXACT_FRESNEL = false;
+#endif
+layout(constant_id = 3) const bool ENCODE_SRGB = false;
+layout(constant_id = 4) const bool HOST_BACKGROUND = false; // only liquid is drawn, over what is there
+#ifndef EMPTY
+layout(push_constant) uniform PushBlock {
+    uint slots;    // of the directory
+    float level;   // of the surface, in whole numbers of a node
+    float ball;    // radius of a ball, in spacings
+    float spacing; // of the nodes, in particle radii
+} push;
+#endif
+layout(location = 0) out vec4 out_color;
+#ifdef DEBUG
+layout(location = 1) out vec4 out_walk;      // pattern, outcome, hits, length inside
+layout(location = 2) out vec4 out_direction; // world space; w: surfaces whose normal faced the wrong way
+#endif
+#include "environment.glsl"
+#include "scene.glsl"
+#ifdef EMPTY
+void main() {
+    if (HOST_BACKGROUND) discard;
+    vec3 dir = normalize(view_ray(gl_FragCoord.xy)), color = behind(ivec2(gl_FragCoord.xy), dir);
+    out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
+#ifdef DEBUG
+    out_walk = vec4(float(PATTERN_NONE), float(OUTCOME_NO_LIQUID), 0.0, 0.0);
+    out_direction = vec4(transpose(mat3(frame.view)) * dir, 0.0);
+#endif
+}
+#else
+#include "line.glsl"
+#include "background.glsl"
+#include "field_space.glsl"
+#include "field_walls.glsl"
+layout(set = 0, binding = 10, std430) readonly buffer TileBlock { uvec2 at[]; } tiles; // field_tiles.comp
+
+const int AIR = -1; // beside the classes: what a ray is in
+
+// How far a pixel's view ray has come.
+struct Walk {
+    vec3 x; // in the field
+    vec3 dir;
+    vec3 color; // gathered so far
+    vec3 light; // fraction of what the ray brings back from here on that reaches the eye
+    float hits;
+    float length_inside; // in particle radii
+    float flipped; // surfaces whose normal faced the wrong way
+    int within;    // class of the volume it is in, or AIR
+    vec3 center;   // of the ball, where that is one
+    int second;    // class of the second volume, or -1
+    int outcome;
+    uint volumes;  // entered
+    uint bounces;
+    ivec2 scene_pixel; // where it ended on the scene
+};
+
+// Up to where a ray stays in the box around the liquid, and from where on; beyond that where it passes by.
+vec2 within_box(vec3 x, vec3 dir) {
+    vec3 part = field_part();
+    vec3 low = (frame.bounds_min - BOX_MARGIN) / push.spacing + part, high = (frame.bounds_max + BOX_MARGIN) / push.spacing + part;
+    vec3 per_dir = 1.0 / mix(dir, vec3(1e-20), lessThan(abs(dir), vec3(1e-20)));
+    vec3 a = (low - x) * per_dir, b = (high - x) * per_dir, begin = min(a, b), end = max(a, b);
+    return vec2(max(max(begin.x, begin.y), max(begin.z, 0.0)), min(end.x, min(end.y, end.z)));
+}
+
+void write_pixel(vec3 color, int pattern, int outcome, Walk w) {
+    out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
+#ifdef DEBUG
+    out_walk = vec4(float(pattern), float(outcome), w.hits, w.length_inside);
+    out_direction = vec4(w.dir, w.flipped);
+#endif
+}
+
+// What a ray brings back that meets no more liquid. The host's scene is known in the view alone.
+vec3 light_from(vec3 x, vec3 dir) {
+    vec3 eye = to_eye(x), eye_dir = dir_to_eye(dir);
+#ifdef SCENE
+    return in_sight(eye) ? background(eye, eye_dir) : infinitely_far(eye_dir);
+#else
+    return env_color(eye_dir);
+#endif
+}
+
+// Eqs. (6) to (8) of Imai16 at a wall: what the outside sends back is gathered, and the ray is bent, or
+// beyond the critical angle reflected inside.
+void meet(inout Walk w, Wall wall) {
+    vec3 dir = w.dir, n = normal_at(wall, w.x, dir);
+    bool entering = w.within == AIR;
+    w.hits += 1.0;
+    if ((dot(dir, n) > 0.0) == entering) {
+        n = -n;
+        w.flipped += 1.0;
+    }
+    vec3 against = entering ? n : -n;
+    vec3 bent = refract(dir, against, entering ? 1.0 / frame.ior : frame.ior), mirrored = reflect(dir, against);
+    if (dot(bent, bent) > 0.0) {
+        float before = -dot(dir, against), after = -dot(bent, against);
+        float reflected = fresnel(entering ? before : after, entering ? after : before, frame.ior, EXACT_FRESNEL);
+        w.color += w.light * reflected * light_from(w.x, mirrored);
+        w.light *= 1.0 - reflected;
+        w.dir = bent;
+        w.within = entering ? wall.cls : AIR;
+        w.center = wall.center;
+        if (entering) {
+            ++w.volumes;
+            if (w.volumes == 2u) w.second = wall.cls;
+        }
+        w.x -= FIELD_NUDGE * against;
+    } else {
+        w.dir = mirrored;
+        if (w.bounces == INTERNAL_REFLECTIONS) w.outcome = OUTCOME_REFLECTION_LIMIT;
+        ++w.bounces;
+        w.x += FIELD_NUDGE * against;
+    }
+}
+
+// Whether liquid goes on behind a wall from within: then there is none.
+bool handed_over(inout Walk w) {
+    vec3 center;
+    if (w.within == CLASS_SPLASH && field_at(w.x) >= 0.0) {
+        w.within = CLASS_BODY;
+        return true;
+    }
+    if (ball_around(w.x, center)) {
+        w.within = CLASS_SPLASH;
+        w.center = center;
+        return true;
+    }
+    return false;
+}
+
+// Goes on to the next wall, or to where the walk ends; eq. (9) on the way inside. True where there is nothing to meet: from
+// one volume into another.
+bool go_on(inout Walk w, out Wall wall) {
+    bool inside = w.within != AIR, stopped = false;
+    vec2 box = within_box(w.x, w.dir);
+    if (w.within == CLASS_SPLASH) {
+        vec2 t;
+        meets_ball(w.center, w.x, w.dir, t);
+        t.y = max(t.y, 0.0);
+        wall = Wall(t.y, CLASS_SPLASH, w.center);
+    } else {
+        wall = find_wall(w.x, w.dir, inside, box.x, box.y, stopped);
+    }
+    int found = stopped ? OUTCOME_NOT_CONVERGED : wall.t < NONE ? OUTCOME_HIT : inside ? OUTCOME_NO_WALL : OUTCOME_NO_LIQUID;
+    float t = min(wall.t, max(box.y, 0.0));
+#ifdef SCENE
+    // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
+    float t_scene, gap = 0.0;
+    if (inside && found == OUTCOME_HIT)
+        gap = WETTING_GAP / max(abs(dot(w.dir, normal_at(wall, w.x + t * w.dir, w.dir))), WETTING_FLAT);
+    vec3 eye = to_eye(w.x);
+    if ((inside || found == OUTCOME_HIT) && in_sight(eye) &&
+        meets_scene(in_view(eye, dir_to_eye(w.dir), push.spacing * t + gap), t_scene, w.scene_pixel)) {
+        t = t_scene / push.spacing;
+        found = OUTCOME_SCENE;
+    }
+#endif
+    if (inside) {
+        w.length_inside += push.spacing * t;
+        w.light *= exp(-frame.absorption * (push.spacing * t));
+    }
+    if (inside || found == OUTCOME_HIT) w.x += t * w.dir;
+    w.outcome = found;
+    return found == OUTCOME_HIT && inside && handed_over(w);
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec3 v = view_ray(gl_FragCoord.xy), eye_dir = normalize(v);
+    Walk w = Walk(to_field(frame.near * v), transpose(mat3(frame.view)) * eye_dir, vec3(0.0), vec3(1.0), 0.0, 0.0, 0.0, AIR, vec3(0.0), -1,
+                  OUTCOME_HIT, 0u, 0u, pixel);
+    // From where to where the ray can meet liquid.
+    uvec2 bounds = tiles.at[(pixel.y / FIELD_TILE) * ((int(frame.size.x) + FIELD_TILE - 1) / FIELD_TILE) + pixel.x / FIELD_TILE];
+    float per_depth = 1.0 / (-eye_dir.z * push.spacing);
+    vec2 range = vec2((uintBitsToFloat(bounds.x) - frame.near) * per_depth, (uintBitsToFloat(INFINITE - bounds.y) - frame.near) * per_depth);
+    if (bounds.x == INFINITE) range = vec2(NONE, 0.0);
+    // The near plane may lie in the liquid.
+    if (range.x <= 0.0 && range.y >= 0.0) {
+        if (field_at(w.x) >= 0.0) w.within = CLASS_BODY;
+        else if (ball_around(w.x, w.center)) w.within = CLASS_SPLASH;
+    }
+    int first = w.within;
+    bool straight = first != AIR, stopped = false;
+    Wall wall = Wall(0.0, CLASS_BODY, vec3(0.0));
+    if (straight) {
+        w.volumes = 1u;
+    } else {
+        wall = find_wall(w.x, w.dir, false, max(range.x, 0.0), range.y + FIELD_NUDGE, stopped);
+        first = wall.cls;
+        w.x += wall.t * w.dir;
+    }
+    if (wall.t == NONE || scene_hides(pixel, -to_eye(w.x).z)) {
+        if (HOST_BACKGROUND) discard;
+        write_pixel(behind(pixel, eye_dir), PATTERN_NONE, stopped ? OUTCOME_NOT_CONVERGED : OUTCOME_NO_LIQUID, w);
+        return;
+    }
+    const uint volumes = REFRACTIONS == 1 ? 1u : REFRACTIONS / 2u, most = REFRACTIONS + INTERNAL_REFLECTIONS + uint(MOST_HAND_OVERS);
+    bool done = false;
+    for (uint i = 0u; i < most && !done; ++i) {
+        if (!straight) meet(w, wall);
+        done = REFRACTIONS == 1 || w.outcome != OUTCOME_HIT || (w.within == AIR && w.volumes == volumes);
+        if (!done) {
+            straight = go_on(w, wall);
+            done = w.outcome != OUTCOME_HIT;
+        }
+    }
+    int outcome = done ? w.outcome : OUTCOME_NOT_CONVERGED;
+    if (outcome == OUTCOME_NO_LIQUID) outcome = OUTCOME_HIT; // no second volume
+#ifdef SCENE
+    if (w.outcome == OUTCOME_SCENE) w.color += w.light * scene_light(w.scene_pixel);
+    else
+#endif
+    w.color += w.light * light_from(w.x, w.dir);
+    int pattern = w.second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + w.second;
+    write_pixel(w.color, pattern, outcome, w);
+}
+#endif

@@ -1,0 +1,75 @@
+//! The density field of a dump: its points, bricks, nodes, directory and balls.
+
+use crate::{dump::npy, prepared, render::Job};
+use glam::{DVec3, IVec3};
+use meniscus::{
+    Class,
+    host::Session,
+    layers::{
+        Layers,
+        field::twin::{Lattice, Words},
+    },
+    shader::FIELD_ONE,
+};
+use serde_json::{Value, json};
+use std::error::Error;
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+/// Writes it by `write`, file by file, where the frame has one.
+pub fn write(job: &Job, session: &mut Session, mut write: impl FnMut(&str, Vec<u8>) -> Result<()>) -> Result<()> {
+    let radius = job.scene.particles.radius;
+    let Layers::Field(field) = job.settings.method.layers else { return Ok(()) };
+    let Some(directory) = session.words("field directory", 0)? else { return Ok(()) };
+    let mut words = |name| session.words(name, 0).map(Option::unwrap_or_default);
+    let (records, nodes, balls) = (words("field bricks")?, words("field nodes")?, words("field balls")?);
+    let all = Words { directory: &directory, records: &records, nodes: &nodes, balls: &balls };
+    let bricks = all.bricks();
+    let n = bricks.len() as u64;
+    write("field_directory.npy", npy(&[directory.len() as u64], directory.iter().copied())?)?;
+    write("field_bricks.npy", npy(&[n, 3], bricks.keys().flatten().copied())?)?;
+    write("field_numbers.npy", npy(&[n], bricks.values().map(|b| b.number))?)?;
+    write("field_flags.npy", npy(&[n], bricks.values().map(|b| b.flags as u8))?)?;
+    write("field_cells.npy", npy(&[n], bricks.values().map(|b| b.cells))?)?;
+    let values = bricks.values().flat_map(|b| b.nodes.iter().map(|v| f64::from(*v) / f64::from(FIELD_ONE)));
+    write("field_nodes.npy", npy(&[n, 4, 4, 4], values)?)?;
+    // Balls reach into several bricks.
+    let lattice = Lattice::new(&field, radius);
+    let spacing = f64::from(field.spacing * radius);
+    let in_bricks = bricks.iter().flat_map(|(place, b)| b.balls.iter().map(move |c| (place, c)));
+    let centers: Vec<[f64; 3]> = in_bricks
+        .map(|(place, c)| {
+            let nodes = 4.0 * IVec3::from(*place).as_dvec3() + DVec3::from(c.map(f64::from));
+            (nodes * spacing + job.scene.origin).to_array()
+        })
+        .collect();
+    write("field_balls.npy", npy(&[centers.len() as u64, 3], centers.into_iter().flatten())?)?;
+    let points = match prepared::points(session, radius)? {
+        Some(points) => points,
+        None => job.scene.points()?,
+    };
+    let sign = |c: Class| if c == Class::Splash { -1.0 } else { 1.0 };
+    let point = points.iter().flat_map(|p| {
+        let x = p.position.as_dvec3() + job.scene.origin;
+        [x.x, x.y, x.z, sign(p.class) * f64::from(p.density)]
+    });
+    write("field_points.npy", npy(&[points.len() as u64, 4], point)?)?;
+    write("field.json", serde_json::to_vec_pretty(&about(spacing, &lattice, job))?)
+}
+
+/// What is needed to read and recompute it.
+fn about(spacing: f64, lattice: &Lattice, job: &Job) -> Value {
+    json!({
+        "spacing": spacing,
+        "origin": job.scene.origin.to_array(),
+        "support": lattice.support / lattice.spacing * spacing,
+        "filled_weights": lattice.rest,
+        "level": lattice.level,
+        "ball_radius": lattice.ball / lattice.spacing * spacing,
+        "nodes": "node (i, j, k) lies at origin + (i, j, k) spacing; brick (x, y, z) has those from 4 (x, y, z) on; field_nodes: brick, z, y, x",
+        "flags": "1: some cells hold the surface (field_cells, bit x + 4 y + 16 z); 2: some nodes of its cells are inside; 4: balls reach into it",
+        "directory": "one word a slot, 0 free: the number of a brick (field_numbers) in bits 0 to 23, 0 left out; flags from bit 24, part of the hash from 27",
+        "points": "x, y, z, number density as a part of a filled body's, negative for balls, 0 where nothing is",
+        "field": "sum over points of positive density r of W(distance / support) / (filled_weights max(min(r, 1.2), r / 64)), W the cubic spline, 1 at 0",
+    })
+}

@@ -1,0 +1,142 @@
+//! A density field around the particles, whose level is the liquid's surface (`glsl/layers/field.comp`; Iwasaki06, volume-normalised:
+//! docs/methods.md, "Density field"). It does not hang on the view.
+
+#[cfg(feature = "inspect")]
+pub mod twin;
+
+use super::{Kind, Layering};
+use crate::{
+    frame::Scene,
+    method::Offers,
+    parameters::parameters,
+    passes::{Points, per_particle},
+    plan::{Call, Groups, Plan, Target},
+    prepare::rest_density,
+    shader::{
+        FIELD_FINISH_COMP, FIELD_LINK_COMP, FIELD_MARK_COMP, FIELD_MOST_BRICKS, FIELD_NODES, FIELD_NUMBER_COMP,
+        FIELD_ONE, FIELD_RECORD, FIELD_SCATTER_COMP, FieldBuild, FieldHead, PARTICLE_GROUP, SPLASH_RADIUS, Shader,
+    },
+    space::power_of_two,
+};
+use ash::vk;
+
+parameters! {
+    /// The level of a density field on a sparse grid (Iwasaki06), each particle's share divided by its number density; splashes
+    /// are balls beside it.
+    pub struct Field {
+        /// Distance of the grid's nodes; ours, by measurement: half as much changes little and has eight times the nodes
+        spacing: f32 = 2.0, "particle radii", "1.5 to 3" => |s| (1.5..=3.0).contains(s);
+        /// How far a particle reaches; ours, by measurement
+        kernel: f32 = 5.5, "particle radii", "3 to 6" => |k| (3.0..=6.0).contains(k);
+        /// Density of the surface, as a part of a filled body's; ours: it lies one radius above the outermost particles
+        level: f32 = 0.57, "", "0.05 to 0.95" => |l| (0.05..=0.95).contains(l);
+        /// What there is room for in proportion to the particles, whose own volume is (2 r)³ each: bricks of 64 nodes. Bricks
+        /// beyond it are left out, and counted
+        room: f32 = 6.0, "volumes of the particles", "1 to 1000" => |r| (1.0..=1000.0).contains(r);
+    }
+}
+
+/// Bricks that there is room for in any case, as far as so many particles can reach: 27 each.
+const LEAST_BRICKS: u64 = 4096;
+
+/// Points of which 32 bits can name 27 bricks each.
+pub(crate) const MOST_POINTS: u32 = (u32::MAX - 1) / 27;
+
+/// Balls in bricks that there is room for in any case, as far as so many particles can reach: 8 bricks each.
+const LEAST_BALLS: u64 = 65_536;
+
+/// What its passes count.
+const COUNTED: [&str; 3] = ["field_bricks", "field_bricks_left_out", "field_balls_left_out"];
+
+/// A field as its readers find it.
+#[derive(Clone, Copy)]
+pub(crate) struct Volume {
+    pub head: Target,
+    pub table: Target,
+    pub records: Target,
+    pub nodes: Target,
+    pub balls: Target,
+    pub build: FieldBuild,
+    /// Distance of the nodes in particle radii.
+    pub spacing: f32,
+}
+
+impl Layering for Field {
+    fn offers(&self) -> Offers {
+        Offers { backs: true, ..Offers::default() }
+    }
+
+    fn kind(&self) -> Kind<'_> {
+        Kind::Field(self)
+    }
+}
+
+impl Field {
+    /// What the passes are told of so many particles.
+    fn build(&self, scene: &Scene) -> FieldBuild {
+        let count = u64::from(scene.count);
+        let edge = f64::from(4.0 * self.spacing);
+        let bricks = (f64::from(self.room) * count as f64 * 8.0 / edge.powi(3)) as u64;
+        let bricks = bricks.max(LEAST_BRICKS).min(27 * count).min(u64::from(FIELD_MOST_BRICKS - 1));
+        let radius = scene.space.radius as f32;
+        let unit = power_of_two(radius);
+        let origin = scene.space.origin.as_vec3() * unit;
+        FieldBuild {
+            count: scene.count,
+            capacity: bricks as u32 + 1,
+            slots: (3 * bricks).next_power_of_two().clamp(64, 1 << 26) as u32,
+            ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count) as u32,
+            spacing: self.spacing * (radius * unit),
+            reach: self.kernel / self.spacing,
+            unit: (f64::from(FIELD_ONE) / rest_density(f64::from(self.kernel))) as f32,
+            ball: SPLASH_RADIUS / self.spacing,
+            level: (self.level * FIELD_ONE as f32).round() as u32,
+            origin_x: origin.x,
+            origin_y: origin.y,
+            origin_z: origin.z,
+        }
+    }
+
+    /// Builds it.
+    pub(crate) fn record(&self, plan: &mut Plan, scene: &Scene, points: &Points) -> Volume {
+        let build = self.build(scene);
+        let words = |n: u32| 4 * u64::from(n);
+        let head = plan.buffer("field head", size_of::<FieldHead>() as u64);
+        let table = plan.array("field directory", words(build.slots));
+        let records = plan.array("field bricks", words(FIELD_RECORD) * u64::from(build.capacity));
+        let nodes = plan.array("field nodes", words(FIELD_NODES) * u64::from(build.capacity));
+        let balls = plan.array("field balls", 16 * u64::from(build.ball_capacity));
+        for zeros in [head, table, records, nodes] {
+            plan.fill("field", zeros, 0, vk::WHOLE_SIZE, 0);
+        }
+        let call = |shader: &'static Shader| Call::compute(shader).update("table", table).push_all(&build);
+        let mark = call(&FIELD_MARK_COMP).read("points", points.points).counting(&COUNTED);
+        plan.dispatch("field", mark, per_particle(build.count));
+        let number = call(&FIELD_NUMBER_COMP)
+            .update("head", head)
+            .read("points", points.points)
+            .update("records", records)
+            // Where the host prepared the points, the shader does not look; something has to be bound all the same.
+            .read("extent", points.extent.unwrap_or(points.points))
+            .constant("ORIGIN_ON_DEVICE", points.extent.is_some())
+            .counting(&COUNTED);
+        plan.dispatch("field", number, per_particle(build.slots));
+        let scatter = call(&FIELD_SCATTER_COMP)
+            .update("head", head)
+            .read("points", points.points)
+            .update("records", records)
+            .update("nodes", nodes)
+            .write("balls", balls)
+            .counting(&COUNTED);
+        plan.dispatch("field", scatter, per_particle(build.count));
+        let a_brick_each = Groups::Indirect(head, 0);
+        let link = call(&FIELD_LINK_COMP).read("head", head).update("records", records);
+        plan.dispatch("field", link, a_brick_each);
+        let finish = call(&FIELD_FINISH_COMP).read("head", head).update("records", records).read("nodes", nodes);
+        plan.dispatch("field", finish, a_brick_each);
+        Volume { head, table, records, nodes, balls, build, spacing: self.spacing }
+    }
+}
+
+// One invocation a node.
+const _: () = assert!(FIELD_NODES == PARTICLE_GROUP);

@@ -1,0 +1,339 @@
+//! The density field on a sparse grid against its formula: nodes, bricks, flags, balls and directory.
+
+use crate::{
+    shape::empty,
+    support::{Case, Cloud, Driver, Random, Shot, each_driver},
+};
+use glam::{Vec3, Vec4};
+use meniscus::{
+    Class, Particles, Point, Settings,
+    layers::{
+        Layers,
+        field::{
+            Field,
+            twin::{Brick, Lattice, Place, Words, node_of, whole},
+        },
+    },
+    prepare::{Input, Options, Search, points, prepare},
+    shader::{FIELD_BALLS, FIELD_INSIDE, FIELD_ONE, FIELD_SURFACE},
+};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Settings with a field, and light that bends so often.
+pub fn settings(field: Field, optics: &str) -> Settings {
+    let mut settings = Settings::default();
+    settings.method.layers = Layers::Field(field);
+    settings.method.choose("smooth", "none").expect("a member");
+    settings.method.choose("optics", optics).expect("a member");
+    settings.validate().expect("they go together");
+    settings
+}
+
+/// Positions whose classes and ellipsoids the host has prepared.
+pub fn prepared(positions: &[Vec3], case: &Case) -> Case {
+    let (particles, _) = prepare(&Input::new(positions, case.particles.radius), &Options::default()).expect("valid");
+    Case { particles, ..case.clone() }
+}
+
+/// Renders positions that the host has prepared: with their points.
+pub fn shoot(driver: &Driver, positions: &[Vec3], case: &Case) -> (Shot, Vec<Vec4>) {
+    let found = points(&Input::new(positions, case.particles.radius), &Options::default()).expect("valid");
+    (driver.shoot_points(&prepared(positions, case), &found), packed(&found, case.particles.radius))
+}
+
+/// Points as the device has them.
+fn packed(points: &[Point], radius: f32) -> Vec<Vec4> {
+    let unit = 2f32.powi(-radius.log2().floor() as i32);
+    let sign = |p: &Point| if p.class == Class::Splash { -p.density } else { p.density };
+    points.iter().map(|p| (p.position * unit).extend(sign(p))).collect()
+}
+
+/// Those that the device has made.
+fn made(shot: &Shot) -> Vec<Vec4> {
+    shot.floats("particle points", 0).expect("points").chunks_exact(4).map(Vec4::from_slice).collect()
+}
+
+pub fn words(shot: &Shot) -> Words<'_> {
+    let of = |name| shot.words(name, 0).expect("a field");
+    Words {
+        directory: of("field directory"),
+        records: of("field bricks"),
+        nodes: of("field nodes"),
+        balls: of("field balls"),
+    }
+}
+
+/// Flags, nodes, cells and balls of a brick.
+type Content = (u32, Vec<u32>, u64, BTreeSet<[u32; 3]>);
+
+/// What of a field does not hang on how its bricks are numbered.
+fn content(shot: &Shot) -> BTreeMap<Place, Content> {
+    let bricks = words(shot).bricks();
+    let balls = |b: &Brick| b.balls.iter().map(|c| c.map(f32::to_bits)).collect();
+    bricks.iter().map(|(place, b)| (*place, (b.flags, b.nodes.clone(), b.cells, balls(b)))).collect()
+}
+
+fn block(n: [i32; 3], radius: f32, origin: Vec3, jitter: f32) -> Vec<Vec3> {
+    let mut random = Random(3);
+    let mut all = Vec::new();
+    for x in 0..n[0] {
+        for y in 0..n[1] {
+            for z in 0..n[2] {
+                let off = random.point(Vec3::splat(-jitter), Vec3::splat(jitter));
+                all.push(origin + radius * (2.0 * Vec3::new(x as f32, y as f32, z as f32) + off));
+            }
+        }
+    }
+    all
+}
+
+/// Name, radius and positions.
+fn clouds() -> Vec<(&'static str, f32, Vec<Vec3>)> {
+    let mut random = Random(8);
+    let mut spray = block([9, 8, 7], 0.05, Vec3::new(-0.5, -0.4, -0.3), 0.4);
+    spray.extend((0..60).map(|_| random.point(Vec3::splat(-1.2), Vec3::splat(1.2))));
+    let mut stray = block([4, 4, 4], 0.7, Vec3::splat(-2.1), 0.0);
+    stray.push(Vec3::new(-7e4, 1.3, 2.0));
+    let mut crowd = block([3, 3, 3], 0.1, Vec3::ZERO, 0.1);
+    crowd.extend([Vec3::new(0.3, 0.1, 0.2); 3000]);
+    vec![
+        ("a block and spray around the origin", 0.05, spray),
+        ("a block far out", 0.01, block([6, 5, 7], 0.01, Vec3::new(-700.0, 300.0, -41.0), 0.3)),
+        ("a small block", 1e-8, block([5, 5, 5], 1e-8, Vec3::splat(-3.3e-8), 0.2)),
+        ("a stray 1e5 radii away", 0.7, stray),
+        ("a crowd on one spot", 0.1, crowd),
+        ("one particle", 0.1, vec![Vec3::new(-0.03, 0.2, -7.0)]),
+    ]
+}
+
+fn check(shot: &Shot, points: &[Vec4], lattice: &Lattice, label: &str) {
+    let words = words(shot);
+    let bricks = words.bricks();
+    // Which there are. Where rounding decides, both are right.
+    let room = 1e-4 * lattice.spacing;
+    let [least, most] = [-room, room].map(|more| lattice.bricks(points, more));
+    assert!(least.iter().all(|b| bricks.contains_key(b)), "{label}: bricks are missing");
+    let odd = bricks.keys().find(|b| !most.contains(*b));
+    assert!(odd.is_none(), "{label}: {odd:?} is out of reach");
+    assert_eq!(shot.counter("field_bricks") as usize, bricks.len(), "{label}");
+    assert_eq!([shot.counter("field_bricks_left_out"), shot.counter("field_balls_left_out")], [0, 0], "{label}");
+
+    // The field at each node.
+    let wanted = lattice.nodes(points);
+    let (mut worst, mut inside) = (0f64, 0);
+    for (place, brick) in &bricks {
+        for (k, found) in brick.nodes.iter().enumerate() {
+            let node = [0, 1, 2].map(|axis| 4 * place[axis] + (k >> (2 * axis) & 3) as i32);
+            let (sum, count) = wanted.get(&node).copied().unwrap_or_default();
+            let off = (f64::from(*found) - whole(sum)).abs() / (0.7 * f64::from(count) + 3e-6 * whole(sum) + 1.0);
+            assert!(off <= 1.0, "{label}: node {node:?} of {count} points holds {found} instead of {}", whole(sum));
+            worst = worst.max(off);
+            inside += usize::from(whole(sum) >= whole(lattice.level));
+        }
+    }
+    let lost = wanted.iter().find(|(node, (sum, _))| whole(*sum) > 1.0 && node_of(&bricks, **node) == 0);
+    assert!(lost.is_none(), "{label}: {lost:?}");
+
+    // What follows from the nodes.
+    let level = whole(lattice.level).round() as u32;
+    let mut surface = 0;
+    for (place, brick) in &bricks {
+        let label = format!("{label}: brick {place:?}");
+        let mut cells = 0u64;
+        let mut any_inside = false;
+        for k in 0..64 {
+            let corners = (0..8).filter(|c| {
+                let at = |axis: usize| 4 * place[axis] + (k >> (2 * axis) & 3) + (c >> axis & 1);
+                node_of(&bricks, [at(0), at(1), at(2)]) >= level
+            });
+            let corners = corners.count();
+            any_inside |= corners > 0;
+            cells |= u64::from(corners > 0 && corners < 8) << k;
+        }
+        assert_eq!(brick.cells, cells, "{label}: cells");
+        assert_eq!([brick.has(FIELD_SURFACE), brick.has(FIELD_INSIDE)], [cells != 0, any_inside], "{label}: flags");
+        assert_eq!(brick.has(FIELD_BALLS), !brick.balls.is_empty(), "{label}: flag of balls");
+        surface += cells.count_ones();
+        for (k, number) in brick.neighbours.iter().enumerate() {
+            let next = [0, 1, 2].map(|axis| place[axis] + (k >> axis & 1) as i32);
+            assert_eq!(*number, bricks.get(&next).map_or(0, |b| b.number), "{label}: neighbour {k}");
+            assert_eq!(words.find(next), *number, "{label}: look-up of {next:?}");
+        }
+        assert_eq!(words.find(place.map(|c| c - 1_000_000)), 0, "{label}: look-up of what is not there");
+    }
+
+    // Balls, in each brick that they reach.
+    let mut balls = 0;
+    for point in points.iter().filter(|p| p.w < 0.0) {
+        let [sure, maybe] = [-room, room].map(|more| lattice.reached(point, more));
+        let x = point.truncate().as_dvec3() / lattice.spacing;
+        let in_brick = |place: &Place| {
+            let corner = 4.0 * glam::IVec3::from(*place).as_dvec3();
+            let near = |c: &&[f32; 3]| (corner + Vec3::from(**c).as_dvec3()).distance(x) < 1e-3 + 1e-6 * x.length();
+            bricks.get(place).is_some_and(|b| b.balls.iter().any(|c| near(&c)))
+        };
+        assert!(sure.iter().all(in_brick), "{label}: a ball at {point} is missing");
+        balls += maybe.len();
+    }
+    let listed: usize = bricks.values().map(|b| b.balls.len()).sum();
+    assert!(listed <= balls, "{label}: {listed} balls in bricks, not {balls}");
+    println!("{label}: {} bricks, {inside} nodes inside, {surface} cells, {listed} balls, {worst:.2}", bricks.len());
+}
+
+#[test]
+fn nodes_bricks_and_flags_are_the_twins() {
+    for (name, radius, positions) in clouds() {
+        for field in [Field::default(), Field::default().spacing(1.5).kernel(4.0).level(0.4)] {
+            let lattice = Lattice::new(&field, radius);
+            let case = Case { settings: settings(field, "one"), ..empty(radius) };
+            each_driver(|driver| {
+                let (shot, points) = shoot(driver, &positions, &case);
+                check(&shot, &points, &lattice, &format!("{}: {name}", driver.name));
+                let shot = driver.shoot_cloud_unlisted(&case, &Cloud::new(&positions, Search::Runs));
+                let own = made(&shot);
+                check(&shot, &own, &lattice, &format!("{}: {name}, on the device", driver.name));
+                // The device's points are the host's.
+                let sorted = |points: &[Vec4]| {
+                    let mut all = points.to_vec();
+                    all.sort_by(|a, b| a.to_array().map(f32::to_bits).cmp(&b.to_array().map(f32::to_bits)));
+                    all
+                };
+                for (a, b) in sorted(&points).iter().zip(sorted(&own)) {
+                    assert!(a.truncate() == b.truncate(), "{}: {name}: {a} and {b}", driver.name);
+                    // Of a crowd each takes others that stand for it.
+                    let same = (a.w - b.w).abs() <= 2e-4 * a.w.abs() || name.contains("crowd");
+                    assert!(same, "{}: {name}: {a} and {b}", driver.name);
+                }
+            });
+        }
+    }
+}
+
+/// The order of the particles, and where the eye is, change no bit of the field.
+#[test]
+fn order_and_view_do_not_show() {
+    let (_, radius, positions) = clouds().swap_remove(0);
+    let mut random = Random(77);
+    let mut shuffled = positions.clone();
+    for i in (1..shuffled.len()).rev() {
+        shuffled.swap(i, (random.unit() * (i + 1) as f32) as usize % (i + 1));
+    }
+    let case = Case { settings: settings(Field::default(), "four"), ..empty(radius) };
+    let elsewhere = crate::support::camera(Vec3::new(0.4, 2.0, -1.0), Vec3::ZERO, case.size);
+    let moved = Case { camera: elsewhere, ..case.clone() };
+    each_driver(|driver| {
+        let (shot, _) = shoot(driver, &positions, &case);
+        let first = content(&shot);
+        assert!(first.values().any(|b| b.0 & FIELD_SURFACE != 0 && b.3.len() > 1), "{}", driver.name);
+        for (what, positions, case) in
+            [("shuffled", &shuffled, &case), ("seen from elsewhere", &positions, &moved), ("again", &positions, &case)]
+        {
+            let (other, _) = shoot(driver, positions, case);
+            assert!(content(&other) == first, "{}: {what}", driver.name);
+            if what != "seen from elsewhere" {
+                assert!(other.picture == shot.picture, "{}: {what}: the picture", driver.name);
+            }
+        }
+        let on_device =
+            |positions: &[Vec3]| content(&driver.shoot_cloud_unlisted(&case, &Cloud::new(positions, Search::Runs)));
+        assert!(on_device(&positions) == on_device(&shuffled), "{}: shuffled on the device", driver.name);
+    });
+}
+
+/// A filled body's field is 1, and its level lies one radius above the outermost centres.
+#[test]
+fn a_filled_bodys_field_is_one_and_its_surface_where_the_liquids_is() {
+    let radius = 0.05;
+    let positions = block([12, 12, 12], radius, Vec3::ZERO, 0.0);
+    let field = Field::default();
+    let lattice = Lattice::new(&field, radius);
+    let case = Case { settings: settings(field, "one"), ..empty(radius) };
+    each_driver(|driver| {
+        let (shot, _) = shoot(driver, &positions, &case);
+        let bricks = words(&shot).bricks();
+        let at = |x: f64, y: f64, z: f64| {
+            let place = [x, y, z].map(|c| (c / lattice.spacing).round() as i32);
+            f64::from(node_of(&bricks, place)) / f64::from(FIELD_ONE)
+        };
+        // The middle of the block, in the units of points.
+        let r = lattice.ball / 1.24;
+        let middle = at(11.0 * r, 11.0 * r, 11.0 * r);
+        assert!((middle - 1.0).abs() < 0.03, "{}: {middle}", driver.name);
+        // Above its face, in steps of the lattice: where the level is crossed between two nodes.
+        let heights: Vec<_> = (0..12)
+            .map(|k| {
+                (f64::from(k) * lattice.spacing, at(11.0 * r, 11.0 * r, 22.0 * r + f64::from(k) * lattice.spacing))
+            })
+            .collect();
+        let crossing =
+            heights.windows(2).find(|w| w[0].1 >= lattice.level && w[1].1 < lattice.level).expect("a surface");
+        let [(a, fa), (b, fb)] = [crossing[0], crossing[1]];
+        let base = ((22.0 * r) / lattice.spacing).round() * lattice.spacing - 22.0 * r;
+        let height = (base + a + (b - a) * (fa - lattice.level) / (fa - fb)) / r;
+        println!("{}: the surface lies {height:.2} r above the outermost centres", driver.name);
+        assert!((height - 1.0).abs() < 0.2, "{}: {height}", driver.name);
+    });
+}
+
+/// Without room bricks are left out and counted, and nothing else breaks; without particles there is no field.
+#[test]
+fn what_there_is_no_room_for_is_counted() {
+    // Far from each other and all of the body: 27 bricks each, or nearly.
+    let positions: Vec<Vec3> =
+        (0..512).map(|i| 3.0 * Vec3::new((i % 8) as f32, (i / 8 % 8) as f32, (i / 64) as f32)).collect();
+    let case = Case { settings: settings(Field::default().room(1.0), "four"), ..empty(0.1) };
+    each_driver(|driver| {
+        let options = Options::default().splash_threshold(0.0);
+        let cloud = Cloud { options, ..Cloud::new(&positions, Search::Runs) };
+        let shot = driver.shoot_cloud_unlisted(&case, &cloud);
+        let [there, missing] = ["field_bricks", "field_bricks_left_out"].map(|name| shot.counter(name));
+        println!("{}: {there} bricks, {missing} left out", driver.name);
+        assert_eq!(there, 4096, "{}", driver.name);
+        let all = Lattice::new(&Field::default(), 0.1).bricks(&made(&shot), 0.0).len();
+        assert!((there + missing).abs_diff(all as u32) <= all as u32 / 100, "{}: {missing} of {all}", driver.name);
+        assert!(shot.picture.as_flattened().iter().all(|v| v.is_finite()), "{}", driver.name);
+        let (nothing, _) = shoot(driver, &[], &case);
+        assert!(nothing.words("field nodes", 0).is_none(), "{}", driver.name);
+    });
+}
+
+/// Particles that the host prepared come without points, which are asked for; and wrong ones are refused.
+#[test]
+fn points_are_asked_for() {
+    let positions = block([3, 3, 3], 0.1, Vec3::ZERO, 0.0);
+    let case = prepared(&positions, &Case { settings: settings(Field::default(), "two"), ..empty(0.1) });
+    each_driver(|driver| {
+        let session = &mut *driver.session.borrow_mut();
+        session.renderer.set_particles(&case.particles).expect("particles");
+        let input = meniscus::FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null());
+        let refused = session.frame(&input).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(refused.contains("layers") && refused.contains("set_points"), "{}: {refused}", driver.name);
+        let good = Point { position: Vec3::ZERO, density: 1.0, class: Class::Body };
+        for bad in
+            [vec![good; 26], vec![Point { density: f32::NAN, ..good }; 27], vec![Point { density: 0.0, ..good }; 27]]
+        {
+            let refused = session.renderer.set_points(&bad).err().map(|e| e.to_string()).unwrap_or_default();
+            assert!(refused.contains("points"), "{}: {refused}", driver.name);
+        }
+    });
+}
+
+/// A field that the device cannot bind is refused before anything is made for it, by what it would take.
+#[test]
+fn a_field_larger_than_the_device_binds_is_refused() {
+    let positions = block([40, 32, 32], 0.1, Vec3::ZERO, 0.0);
+    let ball = |center: &Vec3| crate::support::sphere(*center, 0.1);
+    let particles = Particles { radius: 0.1, ellipsoids: positions.iter().map(ball).collect(), splash_count: 0 };
+    let points: Vec<_> = positions.iter().map(|p| Point { position: *p, density: 1.0, class: Class::Body }).collect();
+    let case = Case { particles, settings: settings(Field::default().room(1000.0), "two"), ..empty(0.1) };
+    each_driver(|driver| {
+        let session = &mut *driver.session.borrow_mut();
+        session.renderer.set_particles(&case.particles).expect("particles");
+        session.renderer.set_points(&points).expect("points");
+        let input = meniscus::FrameInput::new(0, &case.camera, &case.settings, ash::vk::ImageView::null());
+        match session.frame(&input) {
+            Err(e) => assert!(e.to_string().contains("field nodes would take 163840"), "{}: {e}", driver.name),
+            Ok(_) => assert!(!driver.name.contains("Mesa"), "{}: lavapipe binds 128 MiB", driver.name),
+        }
+    });
+}

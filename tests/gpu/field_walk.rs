@@ -1,0 +1,264 @@
+//! The walk through a density field against its twin, which walks in the field that the device has built.
+
+use crate::{
+    background::{HostScene, painted},
+    drivers::SKY,
+    field::{prepared, settings, words},
+    support::{Case, Choose, Driver, Random, Shot, camera, each_driver},
+    walk::degrees,
+};
+use glam::{DVec3, Vec3};
+use meniscus::{
+    Background,
+    layers::{Layers, field::Field},
+    shader::{
+        Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED, OUTCOME_REFLECTION_LIMIT,
+        OUTCOME_SCENE, PATTERN_BODY, PATTERN_NONE, PATTERN_SPLASH,
+    },
+    twin::{
+        background::Scene,
+        field_walk::{Field as Twin, walk},
+        walk::Walk,
+        walls::{Map, Maps},
+    },
+};
+use rayon::prelude::*;
+
+const SIZE: [u32; 2] = [160, 120];
+
+/// A block, a smaller one above it, and spray; positions.
+fn scene() -> Vec<Vec3> {
+    let mut random = Random(12);
+    let mut all = Vec::new();
+    for (n, corner) in [([14, 5, 10], Vec3::new(-0.7, -0.5, -0.5)), ([4, 4, 4], Vec3::new(-0.1, 0.35, -0.2))] {
+        for i in 0..n[0] * n[1] * n[2] {
+            let at = Vec3::new((i % n[0]) as f32, (i / n[0] % n[1]) as f32, (i / n[0] / n[1]) as f32);
+            all.push(corner + 0.05 * (2.0 * at + random.point(Vec3::splat(-0.4), Vec3::splat(0.4))));
+        }
+    }
+    all.extend((0..40).map(|_| random.point(Vec3::new(-0.9, -0.5, -0.7), Vec3::new(0.9, 0.8, 0.7))));
+    all
+}
+
+fn case(field: Field, refractions: u32, reflections: u32) -> Case {
+    let settings = settings(field, "four").refractions(refractions).reflections(reflections);
+    let camera = camera(Vec3::new(0.5, 0.9, 2.2), Vec3::ZERO, SIZE);
+    let empty = crate::shape::empty(0.05);
+    prepared(&scene(), &Case { settings, camera, size: SIZE, ..empty })
+}
+
+fn shoot(driver: &Driver, case: &Case) -> Shot {
+    let (shot, _) = crate::field::shoot(driver, &scene(), case);
+    shot
+}
+
+/// Each pixel as the GPU has walked it: pattern, outcome, hits, length, direction, colour.
+fn walked(shot: &Shot) -> Vec<Walk> {
+    let (walks, directions) =
+        (shot.floats("walk (debug)", 0).unwrap(), shot.floats("final direction (debug)", 0).unwrap());
+    let numbers = walks.iter().chain(&directions).chain(shot.picture.as_flattened());
+    assert!(numbers.into_iter().all(|v| v.is_finite()), "not finite");
+    let walk = |i: usize| {
+        let (w, d) = (&walks[4 * i..][..4], &directions[4 * i..][..4]);
+        Walk {
+            pattern: w[0] as u32,
+            outcome: w[1] as u32,
+            hits: w[2] as u32,
+            length: f64::from(w[3]),
+            direction: DVec3::new(d[0].into(), d[1].into(), d[2].into()),
+            color: Vec3::from(shot.picture[i]),
+        }
+    };
+    (0..shot.picture.len()).map(walk).collect()
+}
+
+fn twin_of(shot: &Shot, case: &Case, frame: &Frame, pixel: usize) -> Walk {
+    let Layers::Field(own) = case.settings.method.layers else { unreachable!("a field") };
+    let bricks = words(shot).bricks();
+    walk_in(shot, &bricks, own, case, frame, None, pixel)
+}
+
+fn walk_in(
+    shot: &Shot,
+    bricks: &std::collections::BTreeMap<[i32; 3], meniscus::layers::field::twin::Brick>,
+    own: Field,
+    case: &Case,
+    frame: &Frame,
+    scene: Option<Scene>,
+    pixel: usize,
+) -> Walk {
+    let lattice = meniscus::layers::field::twin::Lattice::new(&own, case.particles.radius);
+    // Where the liquid's own space begins, on the lattice.
+    let unit = lattice.ball / (1.24 * f64::from(case.particles.radius));
+    let origin = shot.space.origin * unit / lattice.spacing;
+    let base = origin.floor().as_ivec3();
+    let field =
+        Twin::new(bricks, base.to_array(), origin - base.as_dvec3(), f64::from(own.spacing), f64::from(own.level));
+    let none = Map { depth: &[], normal: &[] };
+    let view = Maps { frame, maps: [[none; 2]; 2], scene };
+    let width = SIZE[0] as usize;
+    walk(&field, &view, &case.settings.walk(), &SKY, [pixel % width, pixel / width])
+}
+
+/// A pixel as the GPU has walked it, and as the twin has.
+type Pair = (usize, Walk, Walk);
+
+/// The share of them that are good is at least so much.
+#[track_caller]
+fn at_least(what: &str, driver: &Driver, all: &[&Pair], share: f64, good: impl Fn(&Walk, &Walk) -> bool) {
+    let bad: Vec<_> = all.iter().filter(|(_, a, b)| !good(a, b)).collect();
+    let found = 1.0 - bad.len() as f64 / all.len().max(1) as f64;
+    println!("    {what}: {:.2} % of {}", 100.0 * found, all.len());
+    assert!(found >= share, "{}: {what} on {:.2} %: {:?}", driver.name, 100.0 * found, bad.first());
+}
+
+fn same(a: &Walk, b: &Walk) -> bool {
+    (a.pattern, a.outcome, a.hits) == (b.pattern, b.outcome, b.hits) && degrees(a.direction, b.direction) <= 0.2
+}
+
+fn compare(driver: &Driver, case: &Case, every: usize) -> Vec<Walk> {
+    let shot = shoot(driver, case);
+    let found = walked(&shot);
+    let bricks = words(&shot).bricks();
+    let Layers::Field(own) = case.settings.method.layers else { unreachable!("a field") };
+    let shifted = [-1e-4, 1e-4].map(|off| Frame { ior: shot.frame.ior * (1.0 + off), ..shot.frame });
+    let pair = |i: usize| {
+        let twin = |frame: &Frame| walk_in(&shot, &bricks, own, case, frame, None, i);
+        let wanted = twin(&shot.frame);
+        // Where the twin itself goes another way with an index that is a little off, rounding decides.
+        let decided = same(&found[i], &wanted) || shifted.iter().all(|frame| same(&twin(frame), &wanted));
+        (decided, (i, found[i], wanted))
+    };
+    let all: Vec<_> = (0..found.len()).into_par_iter().filter(|i| i % every == 0).map(pair).collect();
+    let decided: Vec<_> = all.iter().filter(|p| p.0).map(|p| &p.1).collect();
+    let s = case.settings.walk();
+    println!(
+        "  refractions {}, reflections {}: {} of {} decided",
+        s.refractions,
+        s.internal_reflections,
+        decided.len(),
+        all.len()
+    );
+    assert!(decided.len() * 100 >= all.len() * 97, "{}: {} of {}", driver.name, decided.len(), all.len());
+    at_least("the first volume", driver, &decided, 0.999, |a, b| {
+        (a.pattern == PATTERN_NONE) == (b.pattern == PATTERN_NONE)
+    });
+    let (none, liquid): (Vec<_>, Vec<_>) = decided.into_iter().partition(|(_, _, twin)| twin.pattern == PATTERN_NONE);
+    assert!(none.len() > 200 && liquid.len() > 200, "{}: {} and {}", driver.name, none.len(), liquid.len());
+    at_least("outcome", driver, &liquid, 0.985, |a, b| a.outcome == b.outcome);
+    at_least("pattern and hits", driver, &liquid, 0.985, |a, b| (a.pattern, a.hits) == (b.pattern, b.hits));
+    at_least("direction", driver, &liquid, 0.98, |a, b| degrees(a.direction, b.direction) <= 0.2);
+    let agree: Vec<_> = liquid.into_iter().filter(|(_, a, b)| same(a, b)).collect();
+    at_least("length", driver, &agree, 0.99, |a, b| (a.length - b.length).abs() <= 0.01 * b.length + 0.01);
+    let close = |a: &Walk, b: &Walk| (a.color - b.color).abs().cmple(0.01 * (b.color + 0.5)).all();
+    at_least("colour", driver, &agree, 0.98, close);
+    at_least("colour beside liquid", driver, &none, 0.999, close);
+    found
+}
+
+#[test]
+fn rays_are_walked_as_the_twin_walks_them() {
+    each_driver(|driver| {
+        let mut all = Vec::new();
+        for (field, refractions, reflections) in [
+            (Field::default(), 4, 4),
+            (Field::default().spacing(1.5).kernel(4.0), 2, 1),
+            (Field::default(), 4, 0),
+            (Field::default(), 1, 0),
+        ] {
+            let mut case = case(field, refractions, reflections);
+            if reflections != 1 {
+                case.settings = case.settings.absorption(Vec3::new(0.2, 1.5, 3.0));
+            }
+            all.extend(compare(driver, &case, if refractions == 1 { 5 } else { 11 }));
+        }
+        // Each kind of way has been walked; and none ends in the liquid's box without a wall.
+        let count = |of: &dyn Fn(&Walk) -> bool| all.iter().filter(|w| of(w)).count();
+        assert!(
+            count(&|w| w.outcome == OUTCOME_REFLECTION_LIMIT) > 100 && count(&|w| w.hits > 4) > 100,
+            "{}",
+            driver.name
+        );
+        assert!(
+            count(&|w| w.pattern > PATTERN_BODY) > 100 && count(&|w| w.pattern == PATTERN_SPLASH) > 50,
+            "{}",
+            driver.name
+        );
+        assert_eq!(count(&|w| [OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED].contains(&w.outcome)), 0, "{}", driver.name);
+    });
+}
+
+/// The same through the device's own points; and with an eye in the liquid, whose rays start there.
+#[test]
+fn an_eye_in_the_liquid_sees_from_within() {
+    let mut case = case(Field::default(), 4, 4);
+    case.camera = camera(Vec3::new(-0.2, -0.3, 0.0), Vec3::new(2.0, 0.4, 0.3), SIZE);
+    each_driver(|driver| {
+        let shot = shoot(driver, &case);
+        let found = walked(&shot);
+        let inside = found.iter().filter(|w| w.pattern >= PATTERN_BODY && w.outcome != OUTCOME_NO_LIQUID).count();
+        assert_eq!(inside, found.len(), "{}: every ray starts in the body", driver.name);
+        for i in (0..found.len()).step_by(997) {
+            let twin = twin_of(&shot, &case, &shot.frame, i);
+            let near = same(&found[i], &twin) || found[i].hits > 2;
+            assert!(near, "{}: pixel {i}: {:?} instead of {twin:?}", driver.name, found[i]);
+        }
+    });
+}
+
+/// Points and quads draw the same tiles, whatever the size of the picture.
+#[test]
+fn points_and_quads_draw_the_same() {
+    let mut odd = case(Field::default(), 4, 4);
+    odd.size = [157, 83];
+    odd.camera = camera(Vec3::new(0.3, 0.4, 0.9), Vec3::ZERO, odd.size);
+    let mut quads = odd.clone();
+    quads.settings = quads.settings.quads_only(true);
+    each_driver(|driver| {
+        let [a, b] = [&odd, &quads].map(|case| shoot(driver, case));
+        assert!(walked(&a).iter().filter(|w| w.outcome == OUTCOME_HIT).count() > 500, "{}", driver.name);
+        assert!(a.picture == b.picture, "{}", driver.name);
+    });
+}
+
+/// Rays end on the host's scene, in the liquid too, and it hides liquid and is seen past it; off the screen nothing is known of it.
+#[test]
+fn the_hosts_scene_is_met() {
+    let blocks = |x: u32, y: u32| match (x / 20 + 2 * (y / 20)) % 5 {
+        0 => 2.0 + 0.002 * f64::from(x),
+        1 => 2.4,
+        2 => 2.1 + 0.004 * f64::from(y),
+        3 => 4.0,
+        _ => f64::INFINITY,
+    };
+    let case = case(Field::default(), 4, 4);
+    let painted = painted(SIZE, blocks);
+    let Layers::Field(own) = case.settings.method.layers else { unreachable!("a field") };
+    each_driver(|driver| {
+        for background in [Background::Environment, Background::Host] {
+            let images = HostScene::new(driver.gpu(), &case.camera, SIZE, &painted);
+            let shot = driver.shoot_before(&case, images.input(), background);
+            let depth: Vec<f64> = painted.0.iter().map(|d| d / shot.space.radius).collect();
+            let scene = Scene { depth: &depth, color: &painted.1, sky: background == Background::Host };
+            let (found, bricks) = (walked(&shot), words(&shot).bricks());
+            let chosen = (0..found.len()).into_par_iter().filter(|i| i % 17 == 0);
+            let pair = |i| (i, found[i], walk_in(&shot, &bricks, own, &case, &shot.frame, Some(scene), i));
+            let all: Vec<_> = chosen.map(pair).collect();
+            let all: Vec<&Pair> = all.iter().collect();
+            println!("  {background:?}:");
+            let none = |w: &Walk| w.pattern == PATTERN_NONE;
+            at_least("what is hidden", driver, &all, 0.998, |a, b| none(a) == none(b));
+            let (beside, liquid): (Vec<&Pair>, Vec<&Pair>) = all.into_iter().partition(|(_, _, twin)| none(twin));
+            let met = liquid.iter().filter(|(_, a, _)| a.outcome == OUTCOME_SCENE).count();
+            assert!(met > 20 && beside.len() > 500, "{}: {met} meet the scene", driver.name);
+            at_least("outcome", driver, &liquid, 0.96, |a, b| a.outcome == b.outcome);
+            let agree: Vec<&Pair> = liquid.into_iter().filter(|(_, a, b)| same(a, b)).collect();
+            at_least("length", driver, &agree, 0.98, |a, b| (a.length - b.length).abs() <= 0.01 * b.length + 0.02);
+            let close = |a: &Walk, b: &Walk| (a.color - b.color).abs().cmple(0.02 * (b.color + 0.5)).all();
+            at_least("colour", driver, &agree, 0.96, close);
+            if background == Background::Environment {
+                at_least("colour beside liquid", driver, &beside, 0.998, close);
+            }
+        }
+    });
+}
