@@ -8,6 +8,8 @@ mod render;
 mod scenes;
 mod settings;
 mod signals;
+#[cfg(feature = "study")]
+mod study;
 mod terminal;
 
 use std::{

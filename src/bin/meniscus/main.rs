@@ -6,6 +6,8 @@ mod bench;
 mod camera;
 mod choices;
 mod codes;
+#[cfg(feature = "study")]
+mod compare;
 mod dump;
 mod empty;
 mod info;
@@ -20,6 +22,8 @@ mod scene_file;
 mod stats;
 mod temporary;
 mod terminal;
+#[cfg(feature = "study")]
+mod truth;
 
 use clap::{Parser, Subcommand, error::ContextValue};
 use meniscus::host::{DeviceInfo, HostError};
@@ -43,6 +47,12 @@ enum Command {
     Render(Box<render::Args>),
     /// Measure what each pass takes.
     Bench(Box<bench::Args>),
+    /// Path-trace the same scene off-line on the CPU: the truth that pictures are compared with
+    #[cfg(feature = "study")]
+    Truth(Box<truth::Args>),
+    /// Measure how far a picture is from a reference
+    #[cfg(feature = "study")]
+    Compare(compare::Args),
     /// List devices, drivers, features, limits and file formats.
     Info,
 }
@@ -70,6 +80,10 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
     match command {
         Command::Render(args) => render::run(&args),
         Command::Bench(args) => bench::run(&args),
+        #[cfg(feature = "study")]
+        Command::Truth(args) => truth::run(&args),
+        #[cfg(feature = "study")]
+        Command::Compare(args) => compare::run(&args),
         Command::Info => info::run(),
     }
 }

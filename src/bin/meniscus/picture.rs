@@ -5,7 +5,7 @@ use crate::{
     choices,
     scene::{Prepare, Scene},
 };
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use meniscus::{
     Camera, Equirect, Error, Parameters, Particles, Settings,
     io::{
@@ -153,9 +153,14 @@ impl Picture {
 
     /// The camera, its eye relative to the scene's origin, and the view that it is.
     pub fn camera(&self, scene: &Scene) -> Result<(Camera, Vec3, View), Error> {
+        self.camera_of(scene.origin, &scene.particles)
+    }
+
+    /// [`Picture::camera`] of particles relative to an origin.
+    pub fn camera_of(&self, origin: DVec3, particles: &Particles) -> Result<(Camera, Vec3, View), Error> {
         let aspect = self.size[0].max(1) as f32 / self.size[1].max(1) as f32;
-        let near = 0.1 * scene.particles.radius;
-        let (mut camera, eye, view) = camera::frame(&self.camera, scene.origin, &scene.particles, aspect, near)?;
+        let near = 0.1 * particles.radius;
+        let (mut camera, eye, view) = camera::frame(&self.camera, origin, particles, aspect, near)?;
         camera.environment_rotation = self.environment.rotation.to_radians();
         Ok((camera, eye, view))
     }
