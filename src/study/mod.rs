@@ -17,6 +17,7 @@ pub mod mesh;
 pub mod mesh_file;
 pub mod random;
 pub mod reconstruct;
+pub mod stress;
 pub mod surface;
 pub mod tracer;
 pub mod view;

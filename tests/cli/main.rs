@@ -9,6 +9,8 @@ mod scenes;
 mod settings;
 mod signals;
 #[cfg(feature = "study")]
+mod stress;
+#[cfg(feature = "study")]
 mod study;
 mod terminal;
 

@@ -20,6 +20,8 @@ mod report;
 mod scene;
 mod scene_file;
 mod stats;
+#[cfg(feature = "study")]
+mod stress;
 mod temporary;
 mod terminal;
 #[cfg(feature = "study")]
@@ -53,6 +55,9 @@ enum Command {
     /// Measure how far a picture is from a reference
     #[cfg(feature = "study")]
     Compare(compare::Args),
+    /// Sweep the cases in which methods fail: curves, and what passes, what fails and why
+    #[cfg(feature = "study")]
+    Stress(stress::Args),
     /// List devices, drivers, features, limits and file formats.
     Info,
 }
@@ -84,6 +89,8 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         Command::Truth(args) => truth::run(&args),
         #[cfg(feature = "study")]
         Command::Compare(args) => compare::run(&args),
+        #[cfg(feature = "study")]
+        Command::Stress(args) => stress::run(&args),
         Command::Info => info::run(),
     }
 }
