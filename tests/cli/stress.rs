@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs;
 
 #[test]
-fn the_default_keeps_what_it_promises_and_rivals_are_beside_it() {
+fn the_default_keeps_its_promises_beside_rivals() {
     let run = Run::new();
     let output = run.command(&["stress", "-o", "out", "--small", "--methods", "imai16,green10"]);
     assert!(output.status.success(), "{}", text(&output));
@@ -20,8 +20,10 @@ fn the_default_keeps_what_it_promises_and_rivals_are_beside_it() {
         assert_eq!(r["pass"], r["why"] == "", "{r:#}");
         assert!(r["pass"] == true || r["promised"] == false, "{r:#}");
         // Every case measured something.
-        let found = r["figures"].as_array().expect("figures").iter().filter(|f| f["measure"] != "pixels that are no number");
-        let figures = found.flat_map(|f| f["found"].as_array().expect("a figure a step")).filter(|v| v.is_number()).count();
+        let found =
+            r["figures"].as_array().expect("figures").iter().filter(|f| f["measure"] != "pixels that are no number");
+        let figures =
+            found.flat_map(|f| f["found"].as_array().expect("a figure a step")).filter(|v| v.is_number()).count();
         assert!(figures > 0, "{r:#}");
     }
     // What two volumes of screen-space maps cannot know.
@@ -43,6 +45,9 @@ fn some_cases_of_a_method() {
     let output = run.command(&["stress", "-o", "out", "--small", "--methods", "cords08", "--only", "sheet,shuffled"]);
     assert!(output.status.success(), "{}", text(&output));
     let csv = fs::read_to_string(run.path("out/stress.csv")).expect("figures");
-    assert!(csv.lines().skip(1).all(|l| l.starts_with("sheet,cords08,") || l.starts_with("shuffled,cords08,")), "{csv}");
+    assert!(
+        csv.lines().skip(1).all(|l| l.starts_with("sheet,cords08,") || l.starts_with("shuffled,cords08,")),
+        "{csv}"
+    );
     run.refused(1, &["stress", "-o", "/proc/here", "--only", "sheet"], &["/proc/here", "cannot be written"]);
 }

@@ -99,6 +99,7 @@ pub struct Fault {
 pub const CASES: &[Case] = &[
     angles::GRAZING,
     angles::CRITICAL,
+    angles::RIMS,
     eye::DOLLY_BALL,
     eye::DOLLY_SURFACE,
     same::RESOLUTION,
@@ -145,9 +146,14 @@ impl Case {
 const NO_NUMBER: Measure = Measure { name: "pixels that are no number", bound: 0.0, beyond: "a value is not finite" };
 
 /// The median; `None` of nothing.
-fn median(mut values: Vec<f64>) -> Option<f64> {
+fn median(values: Vec<f64>) -> Option<f64> {
+    quantile(values, 0.5)
+}
+
+/// What this share of values is not above; `None` of nothing.
+fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    values.get((share * values.len() as f64) as usize).copied()
 }
 
 /// Which part of so many it is, in percent; `None` of nothing.

@@ -46,8 +46,8 @@ pub const SEARCH: Case = Case {
             bound: 0.02,
             beyond: "walls are found at other places",
         },
-        Measure { name: "off by more than a degree, %", bound: 10.0, beyond: "walls are missed" },
-        Measure { name: "off by more than 0.1 degrees, %", bound: 20.0, beyond: "walls are found roughly" },
+        Measure { name: "off by more than a degree, %", bound: 6.0, beyond: "walls are missed" },
+        Measure { name: "off by more than 0.1 degrees, %", bound: 7.0, beyond: "walls are found roughly" },
     ],
     steps: |extent| extent.of(&[1.0], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
     run: |rig, settings, steps| {
