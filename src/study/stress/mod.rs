@@ -39,6 +39,9 @@ pub struct Measure {
     pub beyond: &'static str,
 }
 
+/// Runs a method at some steps.
+type Sweep = fn(&mut Rig, &Settings, &[f64]) -> Result<Vec<Step>, StressError>;
+
 /// A failure case.
 #[derive(Clone, Copy)]
 pub struct Case {
@@ -53,7 +56,7 @@ pub struct Case {
     /// Its figures, in the order of a step's.
     pub measures: &'static [Measure],
     steps: fn(Extent) -> Vec<f64>,
-    run: fn(&mut Rig, &Settings, &[f64]) -> Result<Vec<Step>, StressError>,
+    run: Sweep,
 }
 
 /// How much of a sweep is run.

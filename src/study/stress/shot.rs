@@ -101,8 +101,8 @@ impl<'a, 'b> Rig<'a, 'b> {
         let mut maps: [[(Vec<f32>, Vec<u32>); 2]; 2] = Default::default();
         let named = [(names.splash_depth, names.splash_normal), (names.body_depth, names.body_normal)];
         for (class, (depth, normal)) in named.into_iter().enumerate() {
-            for side in 0..2 {
-                maps[class][side] = (floats(read(depth, side as u32)?), read(normal, side as u32)?);
+            for (side, map) in (0..).zip(&mut maps[class]) {
+                *map = (floats(read(depth, side)?), read(normal, side)?);
             }
         }
         let met = floats(read(Some("walk (debug)").filter(|_| walks), 0)?);
