@@ -213,6 +213,10 @@ fn a_chart_goes_on_and_shows_everything() {
         assert!(ways.iter().any(|w| w == way), "no {way} in {ways:?}");
     }
     assert!(lines.iter().skip(1).all(|l| l[4].parse::<f64>().is_ok_and(|ms| ms > 0.0) && l[7] == "3"), "{table}");
+    // Every one of these has a surface of its own, about where the truth's is.
+    let near =
+        |l: &[&str]| l[17].parse::<f64>().is_ok_and(|iou| iou > 0.7) && l[19].parse::<f64>().is_ok_and(|r| r < 1.5);
+    assert!(lines.iter().skip(1).all(|l| near(l)), "{table}");
     assert!(lines.iter().any(|l| l[14] == "true"), "nothing is on the front: {table}");
     // All of it is there: nothing is measured again, so the table is the same.
     assert_eq!(finish(), table);

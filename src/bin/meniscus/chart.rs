@@ -6,6 +6,7 @@ mod measure;
 mod plot;
 mod points;
 mod store;
+mod surface;
 
 use crate::{
     choices, on,
@@ -191,7 +192,7 @@ impl Args {
         let truth = traced(SMOOTHING_PASSES)?;
         let path = store.picture(&truth.key);
         outputs::write(&path, &images::encode_picture(&path, truth.picture.size, &truth.picture.pixels)?)?;
-        let apart = |other: Truth| measures::compare(&truth.picture, &other.picture)?.means(Some(&truth.liquid));
+        let apart = |other: Truth| measures::compare(&truth.picture, &other.picture)?.means(Some(&truth.liquid()));
         let mut width = Vec::new();
         for passes in self.truth_width.iter().filter(|p| **p != SMOOTHING_PASSES) {
             width.push((*passes, apart(traced(*passes)?)?.flip));
@@ -220,7 +221,8 @@ impl Args {
 /// One line a point.
 fn csv(all: &[Charted]) -> String {
     let mut text = "scene,method,varied,value,ms_median,ms_p5,ms_p95,frames,memory_bytes,flip_liquid,flip_hdr_liquid,\
-                    relative_mse_liquid,ssim_liquid,flip_picture,on_front,within_truth_width,truth_width_flip\n"
+                    relative_mse_liquid,ssim_liquid,flip_picture,on_front,within_truth_width,truth_width_flip,surface_iou,surface_depth_r,\
+                    surface_depth_abs_r,surface_normal_degrees\n"
         .to_owned();
     let quoted =
         |s: &str| if s.contains([',', '"', '\n']) { format!("\"{}\"", s.replace('"', "\"\"")) } else { s.to_owned() };
@@ -231,10 +233,11 @@ fn csv(all: &[Charted]) -> String {
             let hdr = p.liquid.flip_hdr.map_or(String::new(), |v| format!("{v:.6}"));
             let widest = one.widest().map_or(String::new(), |v| format!("{v:.6}"));
             let within = one.widest().map_or(String::new(), |v| (p.liquid.flip <= v).to_string());
+            let surface = p.surface_figures().map(|v| v.map_or(String::new(), |v| format!("{v:.5}")));
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
-                "{},{},{},{},{median:.4},{low:.4},{high:.4},{},{},{:.6},{hdr},{:.6e},{:.6},{:.6},{},{within},{widest}",
+                "{},{},{},{},{median:.4},{low:.4},{high:.4},{},{},{:.6},{hdr},{:.6e},{:.6},{:.6},{},{within},{widest},{}",
                 quoted(&one.name),
                 quoted(&p.method),
                 quoted(&name),
@@ -246,6 +249,7 @@ fn csv(all: &[Charted]) -> String {
                 p.liquid.ssim,
                 p.picture.flip,
                 one.front.contains(&i),
+                surface.join(","),
             );
         }
     }

@@ -20,7 +20,7 @@ use meniscus::{
     study::{
         analytic,
         film::{Film, PASS},
-        first,
+        first::{self, First},
         measures::{self, Linear},
         mesh::Mesh,
         mesh_file, reconstruct,
@@ -120,14 +120,21 @@ fn environment(picture: &Picture) -> Result<Equirect, images::ImageError> {
 /// A scene's truth, as `chart` compares pictures with it.
 pub struct Truth {
     pub picture: Linear,
-    /// Where pixel centres meet liquid.
-    pub liquid: Vec<bool>,
+    /// What pixel centres meet.
+    pub first: Vec<First>,
     /// As a relative mean squared error.
     pub noise: f64,
     /// Hash of the mesh.
     pub mesh: String,
     /// Names the truth by all that decides it.
     pub key: String,
+}
+
+impl Truth {
+    /// Where pixel centres meet liquid.
+    pub fn liquid(&self) -> Vec<bool> {
+        self.first.iter().map(|f| f.hits > 0).collect()
+    }
 }
 
 /// The truth of particles whose mesh is smoothed so many times, traced or from the cache.
@@ -151,7 +158,7 @@ pub fn of_scene(
     Ok(Truth {
         noise: measures::relative_noise(&light, &film.variance()),
         picture: Linear { size, pixels: light.iter().map(|p| p.as_vec3().to_array()).collect() },
-        liquid: first::maps(&tracer).iter().map(|m| m.hits > 0).collect(),
+        first: first::maps(&tracer),
         mesh: subject.name.clone(),
         key,
     })

@@ -74,7 +74,8 @@ fn width(one: &Charted) -> String {
 
 fn table(one: &Charted) -> String {
     let mut text = "<table><tr><th>way</th><th>ms</th><th>5 %</th><th>95 %</th><th>FLIP</th><th>HDR-FLIP</th><th>relative MSE</th>\
-                    <th>SSIM</th><th>FLIP, picture</th><th>MB</th><th></th></tr>\n"
+                    <th>SSIM</th><th>FLIP, picture</th><th>silhouette</th><th>depth, r</th><th>|depth|, r</th><th>normal, degrees</th>\
+                    <th>MB</th><th></th></tr>\n"
         .to_owned();
     for (i, (_, p)) in one.points.iter().enumerate() {
         let [median, low, high] = times(p);
@@ -82,11 +83,15 @@ fn table(one: &Charted) -> String {
         let inside = one.widest().is_some_and(|w| p.liquid.flip <= w);
         let notes = [(front, "front"), (inside, "within the truth's width")];
         let notes: Vec<_> = notes.iter().filter(|n| n.0).map(|n| n.1).collect();
+        let digits = [3, 2, 2, 1];
+        let surface =
+            p.surface_figures().into_iter().zip(digits).map(|(v, n)| v.map_or("-".into(), |v| format!("{v:.n$}")));
+        let surface: String = surface.map(|v| format!("<td>{v}</td>")).collect();
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
             "<tr class=\"{}\"><td>{}</td><td>{median:.2}</td><td>{low:.2}</td><td>{high:.2}</td><td>{:.4}</td><td>{}</td><td>{:.3e}</td>\
-             <td>{:.4}</td><td>{:.4}</td><td>{:.1}</td><td class=\"inside\">{}</td></tr>",
+             <td>{:.4}</td><td>{:.4}</td>{surface}<td>{:.1}</td><td class=\"inside\">{}</td></tr>",
             if front { "front" } else { "" },
             escaped(&p.name()),
             p.liquid.flip,
@@ -98,7 +103,8 @@ fn table(one: &Charted) -> String {
             notes.join(", ")
         );
     }
-    text + "</table>\n"
+    text + "</table>\n<p class=\"note\">Of the method's own first surface against the truth's: IoU of the silhouettes; medians of the depth's \
+            error in particle radii (positive: behind), of its absolute value, and of the angle between normals.</p>\n"
 }
 
 /// The pair of points of two methods that are nearest by `apart`; of one method's own where there is no other.

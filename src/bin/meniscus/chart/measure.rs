@@ -4,6 +4,7 @@ use super::{
     Args,
     points::{self, Point, Visit, Way},
     store::Store,
+    surface,
 };
 use crate::{
     bench, outputs,
@@ -13,7 +14,7 @@ use crate::{
     truth::Truth,
 };
 use meniscus::{
-    FrameInput,
+    Camera, FrameInput,
     host::Session,
     io::images,
     profile::FrameTimes,
@@ -74,7 +75,7 @@ pub fn all(
             };
             let mut now = match point.take() {
                 Some(point) => point,
-                None => judge(job, way, key, store, session)?,
+                None => judge(job, way, key, store, &camera, session)?,
             };
             now.visits.push(visit);
             store.keep(key, &now)?;
@@ -87,7 +88,14 @@ pub fn all(
 }
 
 /// The last frame's error against the truth, without times yet.
-fn judge(job: &Job, way: &Way, key: &str, store: &Store, session: &Session) -> Result<Point, Box<dyn Error>> {
+fn judge(
+    job: &Job,
+    way: &Way,
+    key: &str,
+    store: &Store,
+    camera: &Camera,
+    session: &mut Session,
+) -> Result<Point, Box<dyn Error>> {
     let size = job.picture.rendered_size()?;
     let pixels = render::average(&session.picture()?, size, job.picture.supersample);
     let picture = Linear { size: job.picture.size, pixels };
@@ -96,6 +104,8 @@ fn judge(job: &Job, way: &Way, key: &str, store: &Store, session: &Session) -> R
     outputs::write(&path, &images::encode_picture(&path, picture.size, &picture.pixels)?)?;
     let path = store.error_map(key);
     outputs::write(&path, &images::encode_srgb_png(&path, picture.size, &measures::magma(&maps.flip))?)?;
+    let radius = job.scene.particles.radius;
+    let fronts = surface::fronts(session, camera, radius, picture.size, job.picture.supersample)?;
     Ok(Point {
         scene: job.name.to_owned(),
         method: way.method.clone(),
@@ -103,7 +113,8 @@ fn judge(job: &Job, way: &Way, key: &str, store: &Store, session: &Session) -> R
         settings: crate::choices::record(&way.settings),
         memory: session.renderer.memory().iter().map(|e| e.bytes).sum(),
         picture: maps.means(None)?,
-        liquid: maps.means(Some(&job.truth.liquid))?,
+        liquid: maps.means(Some(&job.truth.liquid()))?,
+        surface: fronts.and_then(|seen| measures::surface::compare(&job.truth.first, &seen, radius)),
         visits: Vec::new(),
     })
 }

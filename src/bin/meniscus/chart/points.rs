@@ -1,7 +1,10 @@
 //! What a chart measures: each method as it is, and with one parameter varied at a time.
 
 use crate::choices;
-use meniscus::{Error, Settings, study::measures::Means};
+use meniscus::{
+    Error, Settings,
+    study::measures::{Means, surface::SurfaceError},
+};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::str::FromStr;
@@ -119,12 +122,20 @@ pub struct Point {
     pub memory: u64,
     pub picture: Means,
     pub liquid: Means,
+    /// Of the method's own surface, where it has one at pixels' centres.
+    pub surface: Option<SurfaceError>,
     pub visits: Vec<Visit>,
 }
 
 impl Point {
     pub fn name(&self) -> String {
         name(&self.method, self.varied.as_ref())
+    }
+
+    /// Of the surface: silhouette's IoU, depth and its absolute value in radii, normals in degrees.
+    pub fn surface_figures(&self) -> [Option<f64>; 4] {
+        let s = self.surface;
+        [s.map(|s| s.iou), s.and_then(|s| s.depth), s.and_then(|s| s.depth_absolute), s.and_then(|s| s.normal)]
     }
 
     /// Milliseconds of all frames that were measured.
