@@ -12,6 +12,8 @@
 pub mod analytic;
 pub mod film;
 pub mod first;
+pub mod front;
+
 pub mod measures;
 pub mod mesh;
 pub mod mesh_file;

@@ -1,7 +1,7 @@
 //! `truth` and `compare`.
 
 use super::{Run, block, listing, text};
-use std::{fs, thread, time::Duration};
+use std::{fs, process::Command, thread, time::Duration};
 
 /// A tetrahedron.
 const SOLID: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
@@ -144,4 +144,100 @@ fn bad_input_is_refused_with_advice() {
     run.refused(1, &["compare", a, a, "--json", a], &["at once"]);
     let text = run.file("text.exr", "no picture");
     run.refused(1, &["compare", a, &text], &["text.exr"]);
+}
+
+/// Killed in the middle and started again, a chart has the same errors, and the times that were measured before.
+#[test]
+fn a_chart_goes_on_and_shows_everything() {
+    let run = Run::new();
+    let particles = run.file("p.csv", block(0.0));
+    let args = [
+        "chart",
+        &particles,
+        "-o",
+        "out",
+        "--radius",
+        "0.05",
+        "--size",
+        "64x48",
+        "--methods",
+        "imai16,green10",
+        "--samples",
+        "32",
+        "--truth-width",
+        "0",
+        "--frames",
+        "1",
+        "--rounds",
+        "3",
+        "--device",
+        "llvmpipe",
+        "--vary",
+        "window=5,13",
+        "optics=one",
+    ];
+    let points = run.path("out/points");
+    let records = || {
+        let names = if points.is_dir() { listing(&points) } else { Vec::new() };
+        names.into_iter().filter(|n| n.ends_with(".json")).collect::<Vec<_>>()
+    };
+    let mut child = run.prepared(&args).spawn().expect("meniscus starts");
+    while records().len() < 3 && child.try_wait().expect("a child").is_none() {
+        thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().expect("killed");
+    child.wait().expect("gone");
+    assert!(!run.path("out/chart.csv").exists(), "it was done before it was killed");
+    let visits = |name: &str| {
+        let point: serde_json::Value =
+            serde_json::from_slice(&fs::read(points.join(name)).expect("a point")).expect("JSON");
+        point["visits"].as_array().expect("visits").clone()
+    };
+    let before: Vec<_> = records().into_iter().map(|name| (visits(&name), name)).collect();
+    assert!(!before.is_empty());
+    let finish = || {
+        let output = run.prepared(&args).output().expect("meniscus starts");
+        assert!(output.status.success(), "{}", text(&output));
+        fs::read_to_string(run.path("out/chart.csv")).expect("a table")
+    };
+    let table = finish();
+    for (kept, name) in before {
+        let now = visits(&name);
+        assert!(now.len() == 3 && now.starts_with(&kept), "{name}");
+    }
+    let lines: Vec<Vec<&str>> = table.lines().map(|l| l.split(',').collect()).collect();
+    // Each method as it is, and with what it has of the three variations; green10's front layer has no other optics that fits.
+    let ways: Vec<_> = lines.iter().skip(1).map(|l| [l[1], l[2], l[3]].join(" ")).collect();
+    for way in ["imai16  ", "green10  ", "imai16 window 5", "imai16 window 13", "green10 window 5", "imai16 optics one"]
+    {
+        assert!(ways.iter().any(|w| w == way), "no {way} in {ways:?}");
+    }
+    assert!(lines.iter().skip(1).all(|l| l[4].parse::<f64>().is_ok_and(|ms| ms > 0.0) && l[7] == "3"), "{table}");
+    // Every one of these has a surface of its own, about where the truth's is.
+    let near =
+        |l: &[&str]| l[17].parse::<f64>().is_ok_and(|iou| iou > 0.7) && l[19].parse::<f64>().is_ok_and(|r| r < 1.5);
+    assert!(lines.iter().skip(1).all(|l| near(l)), "{table}");
+    assert!(lines.iter().any(|l| l[14] == "true"), "nothing is on the front: {table}");
+    // All of it is there: nothing is measured again, so the table is the same.
+    assert_eq!(finish(), table);
+    assert_eq!(listing(&run.path("out")), ["cache", "chart.csv", "p.png", "p.svg", "points", "report.html"]);
+    let page = fs::read_to_string(run.path("out/report.html")).expect("a page");
+    assert!(page.matches("data:image/png;base64,").count() == 2 * ways.len() + 1 && !page.contains("src=\"http"));
+    assert!(page.contains("equal time") && page.contains("equal error") && page.contains("class=\"front\""));
+    // In a real browser, where there is one: the page's own script has run and put pictures into the slider.
+    let file = format!("file://{}", run.path("out/report.html").display());
+    let browser =
+        Command::new("chromium").args(["--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", &file]).output();
+    if let Ok(seen) = browser {
+        let page = String::from_utf8_lossy(&seen.stdout).into_owned();
+        let shown = ["class=\"under\"", "class=\"over\""].map(|class| {
+            let image = page.split(class).nth(1).and_then(|rest| rest.split('>').next()).unwrap_or_default();
+            image.contains("src=\"data:image/png;base64,")
+        });
+        assert!(page.contains("data-ready=\"yes\"") && shown == [true; 2], "the page's script failed: {:.2000}", page);
+    }
+    let svg = fs::read_to_string(run.path("out/p.svg")).expect("a chart");
+    assert!(svg.contains("imai16") && svg.contains("0 smoothing passes"), "{svg}");
+    run.refused(1, &["chart", &particles, "-o", "x", "--vary", "colour=1"], &["colour", "window"]);
+    run.refused(2, &["chart", "-o", "x", "--vary", "window"], &["NAME=VALUE"]);
 }

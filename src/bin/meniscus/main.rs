@@ -4,6 +4,8 @@
 
 mod bench;
 mod camera;
+#[cfg(feature = "study")]
+mod chart;
 mod choices;
 mod codes;
 #[cfg(feature = "study")]
@@ -52,6 +54,9 @@ enum Command {
     /// Path-trace the same scene off-line on the CPU: the truth that pictures are compared with
     #[cfg(feature = "study")]
     Truth(Box<truth::Args>),
+    /// Chart speed against accuracy of methods and their parameters
+    #[cfg(feature = "study")]
+    Chart(Box<chart::Args>),
     /// Measure how far a picture is from a reference
     #[cfg(feature = "study")]
     Compare(compare::Args),
@@ -87,6 +92,8 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         Command::Bench(args) => bench::run(&args),
         #[cfg(feature = "study")]
         Command::Truth(args) => truth::run(&args),
+        #[cfg(feature = "study")]
+        Command::Chart(args) => chart::run(&args),
         #[cfg(feature = "study")]
         Command::Compare(args) => compare::run(&args),
         #[cfg(feature = "study")]

@@ -215,7 +215,7 @@ fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dy
 }
 
 /// Mean of each n x n block, in linear light.
-fn average(pixels: &[[f32; 3]], size: [u32; 2], n: u32) -> Vec<[f32; 3]> {
+pub fn average(pixels: &[[f32; 3]], size: [u32; 2], n: u32) -> Vec<[f32; 3]> {
     let (width, n) = (size[0] as usize, n as usize);
     let (w, h) = (width / n, size[1] as usize / n);
     let block = |x: usize, y: usize| {

@@ -1,6 +1,6 @@
 //! `meniscus truth`: a scene, path-traced off-line.
 
-mod cache;
+pub mod cache;
 mod write;
 
 use crate::{
@@ -20,7 +20,8 @@ use meniscus::{
     study::{
         analytic,
         film::{Film, PASS},
-        first,
+        first::{self, First},
+        measures::{self, Linear},
         mesh::Mesh,
         mesh_file, reconstruct,
         surface::{MeshSurface, Surface},
@@ -68,7 +69,7 @@ fn analytic_help() -> String {
     format!("Trace shapes with exact intersections instead of particles:\n{}", each.join("\n"))
 }
 
-fn samples(text: &str) -> Result<u32, String> {
+pub fn samples(text: &str) -> Result<u32, String> {
     // Noise is told by how passes differ: there have to be two.
     let most = 1 << 20;
     let fits = |n: &u32| n.is_multiple_of(PASS) && (2 * PASS..=most).contains(n);
@@ -90,11 +91,7 @@ struct Subject {
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let picture = args.picture()?;
-    // As fine as it is: samples average it.
-    let environment = match &picture.environment.file {
-        Some(file) => images::read_environment_within(file, None, &picture.max_memory)?,
-        None => Equirect::procedural_sky(),
-    };
+    let environment = environment(&picture)?;
     let subject = args.subject(picture)?;
     let cache = args.folders()?;
     let view = View::new(&subject.camera, subject.picture.size, &environment);
@@ -110,6 +107,61 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     terminal::progress(format!("noise: relative MSE {noise:.2e} from {} samples a pixel", args.samples));
     terminal::progress(format!("wrote {}", args.output.display()));
     Ok(ExitCode::SUCCESS)
+}
+
+/// The environment, as fine as it is: samples average it.
+fn environment(picture: &Picture) -> Result<Equirect, images::ImageError> {
+    match &picture.environment.file {
+        Some(file) => images::read_environment_within(file, None, &picture.max_memory),
+        None => Ok(Equirect::procedural_sky()),
+    }
+}
+
+/// A scene's truth, as `chart` compares pictures with it.
+pub struct Truth {
+    pub picture: Linear,
+    /// What pixel centres meet.
+    pub first: Vec<First>,
+    /// As a relative mean squared error.
+    pub noise: f64,
+    /// Hash of the mesh.
+    pub mesh: String,
+    /// Names the truth by all that decides it.
+    pub key: String,
+}
+
+impl Truth {
+    /// Where pixel centres meet liquid.
+    pub fn liquid(&self) -> Vec<bool> {
+        self.first.iter().map(|f| f.hits > 0).collect()
+    }
+}
+
+/// The truth of particles whose mesh is smoothed so many times, traced or from the cache.
+pub fn of_scene(
+    picture: &Picture,
+    scene: &Scene,
+    smoothing_passes: u32,
+    samples: u32,
+    cache: &Cache,
+) -> Result<Truth, Box<dyn Error>> {
+    let environment = environment(picture)?;
+    let mesh = cache.mesh_of(scene, smoothing_passes)?;
+    mesh.check()?;
+    let subject = Subject::of_mesh(picture.clone(), &scene.particles, scene.origin, mesh, Value::Null)?;
+    let size = subject.picture.size;
+    let view = View::new(&subject.camera, size, &environment);
+    let tracer = Tracer::new(&*subject.surface, &view, &subject.liquid);
+    let key = cache::film_key(&subject, &environment, samples);
+    let film = expose(&tracer, cache, &key, size, samples / PASS)?;
+    let light = film.picture();
+    Ok(Truth {
+        noise: measures::relative_noise(&light, &film.variance()),
+        picture: Linear { size, pixels: light.iter().map(|p| p.as_vec3().to_array()).collect() },
+        first: first::maps(&tracer),
+        mesh: subject.name.clone(),
+        key,
+    })
 }
 
 /// All passes of a picture, from those on that the cache has.
@@ -160,7 +212,14 @@ impl Args {
             let shapes = analytic::scene(name).ok_or("no such analytic scene")?;
             let corner = DVec3::splat(1.2);
             let record = json!({"analytic": name});
-            return Subject::new(picture, stand_in(-corner, corner, None), DVec3::ZERO, Box::new(shapes), name, record);
+            return Subject::new(
+                picture,
+                &stand_in(-corner, corner, None),
+                DVec3::ZERO,
+                Box::new(shapes),
+                name,
+                record,
+            );
         }
         let named = |e: &dyn std::fmt::Display, path: &Path| format!("{}: {e}", path.display());
         if let Some(path) = &self.mesh {
@@ -175,10 +234,10 @@ impl Args {
                     DVec3::ZERO
                 };
                 let particles = stand_in(low - origin, high - origin, picture.radius);
-                return Subject::of_mesh(picture, particles, origin, mesh, record);
+                return Subject::of_mesh(picture, &particles, origin, mesh, record);
             }
             let scene = load(&picture)?;
-            return Subject::of_mesh(picture, scene.particles, scene.origin, mesh, record);
+            return Subject::of_mesh(picture, &scene.particles, scene.origin, mesh, record);
         }
         let scene = load(&picture)?;
         let mesh = self.folders()?.mesh_of(&scene, self.smoothing_passes)?;
@@ -186,7 +245,7 @@ impl Args {
         mesh.check().map_err(|e| named(&e, source))?;
         let mut record = mesh_record(&mesh, None);
         record["smoothing_passes"] = json!(self.smoothing_passes);
-        Subject::of_mesh(picture, scene.particles, scene.origin, mesh, record)
+        Subject::of_mesh(picture, &scene.particles, scene.origin, mesh, record)
     }
 
     fn record(&self, subject: &Subject, noise: f64, time: Duration) -> Value {
@@ -250,22 +309,22 @@ fn stand_in(low: DVec3, high: DVec3, radius: Option<f64>) -> Particles {
 impl Subject {
     fn new(
         picture: Picture,
-        particles: Particles,
+        particles: &Particles,
         origin: DVec3,
         surface: Box<dyn Surface>,
         name: &str,
         record: Value,
     ) -> Result<Subject, Box<dyn Error>> {
-        let (camera, _, view) = picture.camera_of(origin, &particles)?;
+        let (camera, _, view) = picture.camera_of(origin, particles)?;
         camera.validate()?;
-        let liquid = picture.settings(&particles).liquid;
+        let liquid = picture.settings(particles).liquid;
         let picture = Picture { camera: view, ..picture };
         Ok(Subject { surface, name: name.to_owned(), record, camera, liquid, picture, origin })
     }
 
     fn of_mesh(
         picture: Picture,
-        particles: Particles,
+        particles: &Particles,
         origin: DVec3,
         mesh: Mesh,
         record: Value,

@@ -4,8 +4,11 @@
 //!   tool's viewing distance (67 pixels a degree), HDR with its ACES curve and its choice of exposures.
 //! * Relative mean squared error: in linear light, the mean over channels of (a - b)² / (b² + [`DARK`]), b the reference.
 //! * SSIM (Wang et al. 2004): see [`ssim`].
+//!
+//! And how far a method's surface is from the truth's: [`surface`].
 
 pub mod ssim;
+pub mod surface;
 
 use crate::srgb::encode_srgb;
 use flip_rs::{DEFAULT_PPD, FlipError, HdrOptions, MAGMA, RgbImage, hdr_flip, ldr_flip};

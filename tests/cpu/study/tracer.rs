@@ -155,6 +155,11 @@ fn shapes_are_met_at_their_nearest_and_left_behind() {
         (ray.origin, leaves, met) = (ray.at(hit.t), Some(hit.id), met + 1);
     }
     assert_eq!(met, 5);
+    // Straight on, two slabs of 0.3; below the last plane the path has no end.
+    let map = uniform_sky();
+    let view = view(&map, [3, 3]);
+    let middle = first::maps(&Tracer::new(&stack, &view, &liquid(0.0)))[4];
+    assert!((middle.path_length - 0.6).abs() < 1e-6 && middle.hits == 5, "{middle:?}");
 }
 
 /// Rays and the environment are those of the renderer's own uniform block, for any camera.

@@ -105,7 +105,7 @@ impl Cache {
 }
 
 /// Names a film by all that decides its samples.
-pub fn film_key(subject: &Subject, environment: &Equirect, samples: u32) -> String {
+pub(super) fn film_key(subject: &Subject, environment: &Equirect, samples: u32) -> String {
     let (camera, liquid) = (&subject.camera, &subject.liquid);
     let mut key = blake3::Hasher::new();
     key.update(&TRACER.to_le_bytes());
