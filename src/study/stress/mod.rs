@@ -53,7 +53,7 @@ pub struct Case {
     pub x: &'static str,
     /// Whether `imai16` and the default stay within its bounds; elsewhere they are known not to.
     pub promised: bool,
-    /// Its figures, in the order of a step's.
+    /// Its figures, in the order of a step's; the first is common to all cases.
     pub measures: &'static [Measure],
     steps: fn(Extent) -> Vec<f64>,
     run: Sweep,
