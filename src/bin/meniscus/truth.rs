@@ -167,7 +167,7 @@ pub fn of_scene(
 /// All passes of a picture, from those on that the cache has.
 fn expose(tracer: &Tracer, cache: &Cache, key: &str, size: [u32; 2], passes: u32) -> Result<Film, Box<dyn Error>> {
     let mut film = cache.film(key, size).unwrap_or_else(|| Film::new(size));
-    if film.passes() > 0 {
+    if film.passes() > 0 && film.passes() < passes {
         terminal::progress(format!("going on from {} of {passes} passes", film.passes()));
     }
     let bar = progress(u64::from(passes) * u64::from(size[1]), "tracing rows");

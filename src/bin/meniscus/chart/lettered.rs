@@ -20,9 +20,8 @@ pub struct Lettered<'a>(pub BitMapBackend<'a>);
 /// The font nearest to a size in pixels.
 fn font(size: f64) -> &'static MonoFont<'static> {
     match size {
-        s if s < 14.0 => &fonts::FONT_7X13,
-        s if s < 19.0 => &fonts::FONT_9X18,
-        _ => &fonts::FONT_10X20,
+        s if s < 17.0 => &fonts::FONT_7X13,
+        _ => &fonts::FONT_9X18,
     }
 }
 

@@ -132,7 +132,7 @@ where
         .position(SeriesLabelPosition::UpperRight)
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(200, 200, 200))
-        .label_font((FONT, 14))
+        .label_font((FONT, 16))
         .draw()?;
     canvas.present()?;
     Ok(())
