@@ -13,6 +13,8 @@ mod stress;
 #[cfg(feature = "study")]
 mod study;
 mod terminal;
+#[cfg(feature = "study")]
+mod tune;
 
 use std::{
     fs,

@@ -2,10 +2,10 @@
 
 mod html;
 mod lettered;
-mod measure;
+pub mod measure;
 mod plot;
-mod points;
-mod store;
+pub mod points;
+pub mod store;
 mod surface;
 
 use crate::{
@@ -198,7 +198,8 @@ impl Args {
             width.push((*passes, apart(traced(*passes)?)?.flip));
         }
         let mut session = Session::new(gpu, picture.rendered_size()?, &picture.environment()?)?;
-        let job = measure::Job { args: self, name, picture, scene: &scene, truth: &truth, device };
+        let (frames, rounds) = (self.frames, self.rounds);
+        let job = measure::Job { frames, rounds, name, picture, scene: &scene, truth: &truth, device };
         let points = measure::all(&job, ways, store, &mut session);
         session.end();
         let points = points?;

@@ -28,6 +28,8 @@ mod temporary;
 mod terminal;
 #[cfg(feature = "study")]
 mod truth;
+#[cfg(feature = "study")]
+mod tune;
 
 use clap::{Parser, Subcommand, error::ContextValue};
 use meniscus::host::{DeviceInfo, HostError};
@@ -63,6 +65,9 @@ enum Command {
     /// Sweep the cases in which methods fail: curves, and what passes, what fails and why
     #[cfg(feature = "study")]
     Stress(stress::Args),
+    /// Find the cheapest settings within an error, or the best within a time, and write them as a scene file
+    #[cfg(feature = "study")]
+    Tune(Box<tune::Args>),
     /// List devices, drivers, features, limits and file formats.
     Info,
 }
@@ -98,6 +103,8 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         Command::Compare(args) => compare::run(&args),
         #[cfg(feature = "study")]
         Command::Stress(args) => stress::run(&args),
+        #[cfg(feature = "study")]
+        Command::Tune(args) => tune::run(&args),
         Command::Info => info::run(),
     }
 }

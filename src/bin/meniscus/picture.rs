@@ -177,6 +177,13 @@ impl Picture {
         settings
     }
 
+    /// With what was left to the scene as it decides: radius, camera, absorption.
+    pub fn settled(self, scene: &Scene) -> Result<Picture, Error> {
+        let (_, _, camera) = self.camera(scene)?;
+        let (radius, settings) = (shortest(scene.particles.radius), self.settings(&scene.particles));
+        Ok(Picture { radius: Some(radius), camera, settings, absorption_given: true, ..self })
+    }
+
     /// Settings of the frame that is rendered.
     pub fn frame_settings(&self, particles: &Particles) -> Result<Settings, Error> {
         choices::enlarge(&self.settings(particles), self.supersample)
@@ -204,4 +211,10 @@ impl Picture {
         all.retain(|key, _| !["particles", "settings"].contains(&key.as_str()));
         all
     }
+}
+
+/// A number as few digits say it, which is the same in single precision.
+fn shortest(value: f32) -> f64 {
+    let short = value.to_string().parse().ok().filter(|short| *short as f32 == value);
+    short.unwrap_or(value.into())
 }

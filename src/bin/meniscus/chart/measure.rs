@@ -1,7 +1,6 @@
 //! Times and errors of all ways to draw one scene.
 
 use super::{
-    Args,
     points::{self, Point, Visit, Way},
     store::Store,
     surface,
@@ -27,7 +26,9 @@ const WARM_UP: u32 = 1;
 
 /// What is measured, and against what.
 pub struct Job<'a> {
-    pub args: &'a Args,
+    /// Frames that are measured whenever a way has its turn, and turns that each has.
+    pub frames: u32,
+    pub rounds: u32,
     pub name: &'a str,
     pub picture: &'a Picture,
     pub scene: &'a Scene,
@@ -44,15 +45,15 @@ pub fn all(
 ) -> Result<Vec<(String, Point)>, Box<dyn Error>> {
     let upload = job.scene.give(job.picture.preparer(), session)?;
     let (camera, eye, _) = job.picture.camera(job.scene)?;
-    let protocol = format!("{} {} {}", job.args.frames, job.args.rounds, job.picture.supersample);
+    let protocol = format!("{} {} {}", job.frames, job.rounds, job.picture.supersample);
     let parts = [job.name, &job.truth.key, job.device, crate::report::COMMIT, &protocol];
     let keys: Vec<String> = ways.iter().map(|way| points::key(&parts, &way.settings)).collect();
     let mut found: Vec<Option<Point>> = keys.iter().map(|key| store.point(key)).collect();
     let visits = |p: &Option<Point>| p.as_ref().map_or(0, |p| p.visits.len() as u64);
-    let bar = progress(u64::from(job.args.rounds) * ways.len() as u64, "measuring");
+    let bar = progress(u64::from(job.rounds) * ways.len() as u64, "measuring");
     bar.set_position(found.iter().map(visits).sum());
     bar.reset_eta();
-    for round in 0..u64::from(job.args.rounds) {
+    for round in 0..u64::from(job.rounds) {
         for ((way, key), point) in ways.iter().zip(&keys).zip(&mut found) {
             if visits(point) > round {
                 continue;
@@ -63,7 +64,7 @@ pub fn all(
             input.eye_inside = job.scene.inside(eye);
             input.positions = upload.as_ref().map(|u| job.scene.on_device(u));
             let mut frames: Vec<FrameTimes> = Vec::new();
-            for i in 0..WARM_UP + job.args.frames {
+            for i in 0..WARM_UP + job.frames {
                 let times = session.frame(&input)?.ok_or("this device has no timestamps: nothing can be measured")?;
                 if i >= WARM_UP {
                     frames.push(times);

@@ -53,6 +53,12 @@ pub struct Way {
     pub settings: Settings,
 }
 
+impl Way {
+    pub fn name(&self) -> String {
+        name(&self.method, self.varied.as_ref())
+    }
+}
+
 fn name(method: &str, varied: Option<&(String, String)>) -> String {
     varied.map_or_else(|| method.to_owned(), |(name, value)| format!("{method} {name}={value}"))
 }
