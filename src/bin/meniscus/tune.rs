@@ -71,6 +71,9 @@ fn above_zero(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0).ok_or_else(|| "use a finite number above 0".into())
 }
 
+/// All ways, and what was found of each, by its name in files.
+type Measured = (Vec<Way>, Vec<(String, Point)>);
+
 /// What is asked for.
 #[derive(Clone, Copy)]
 enum Goal {
@@ -172,13 +175,7 @@ impl Args {
 
     /// The scene's own settings and all published methods; then, as long as that changes what is chosen, the neighbours of the choice
     /// and of those beside it on the front.
-    fn search(
-        &self,
-        goal: Goal,
-        job: &Job,
-        store: &Store,
-        session: &mut Session,
-    ) -> Result<(Vec<Way>, Vec<(String, Point)>), Box<dyn Error>> {
+    fn search(&self, goal: Goal, job: &Job, store: &Store, session: &mut Session) -> Result<Measured, Box<dyn Error>> {
         let own = job.picture.settings;
         let mut start = vec![(choices::method_name(&own), own)];
         for preset in PRESETS {
