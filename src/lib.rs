@@ -84,6 +84,8 @@ mod space;
 pub mod space;
 #[cfg(any(feature = "io", feature = "inspect"))]
 mod srgb;
+#[cfg(feature = "study")]
+pub mod study;
 mod table;
 #[cfg(feature = "inspect")]
 pub mod twin;

@@ -11,7 +11,7 @@ thread_local! {
 
 /// Calls `f`; a panic in it is not printed, and its message returned. The process's panic hook is replaced meanwhile, so
 /// calls from several threads take turns.
-pub(super) fn quietly<T>(f: impl FnOnce() -> T) -> Result<T, String> {
+pub(crate) fn quietly<T>(f: impl FnOnce() -> T) -> Result<T, String> {
     type Hook = Arc<dyn Fn(&PanicHookInfo<'_>) + Sync + Send>;
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _lock = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
@@ -31,7 +31,7 @@ pub(super) fn quietly<T>(f: impl FnOnce() -> T) -> Result<T, String> {
 }
 
 /// Calls `f` on another thread that works for [`quietly`], which then gets its panic.
-pub(super) fn helping<T>(f: impl FnOnce() -> T) -> T {
+pub(crate) fn helping<T>(f: impl FnOnce() -> T) -> T {
     struct Restore(bool);
     impl Drop for Restore {
         fn drop(&mut self) {

@@ -26,7 +26,11 @@ pub enum ImageError {
     #[error("{}: cannot be read ({source}); {}", quote::path(path), reading_remedy(source.kind()))]
     Io { path: PathBuf, source: std::io::Error },
     /// Not an image, or damaged.
-    #[error("{}: {}; environment maps are whole .hdr, .exr or .png files", quote::path(path), quote::cut(detail, 160))]
+    #[error(
+        "{}: {}; pictures and environment maps are whole .hdr, .exr or .png files",
+        quote::path(path),
+        quote::cut(detail, 160)
+    )]
     Decode { path: PathBuf, detail: String },
     /// Readable, but no environment map.
     #[error("{}: {source}", quote::path(path))]
@@ -134,6 +138,35 @@ fn decode(name: &Path, mut input: impl BufRead + Seek, frame: &Frame<'_>) -> Res
     }
 }
 
+/// Reads a picture of linear light (.exr, .hdr) or sRGB (.png, made linear): its width and height, and RGB row by row.
+///
+/// # Errors
+/// [`ImageError`] with the file's name: it is no picture, is damaged, or has light that is not finite.
+pub fn read_picture(path: &Path, budget: &Budget) -> Result<([u32; 2], Vec<[f32; 3]>), ImageError> {
+    let io = |source| ImageError::Io { path: path.into(), source };
+    let decoding = |detail: String| ImageError::Decode { path: path.into(), detail };
+    let file = BufReader::new(File::open(path).map_err(io)?);
+    let mut reader = image::ImageReader::new(file).with_guessed_format().map_err(io)?;
+    let mut limits = image::Limits::default();
+    // What is decoded is at hand twice for a moment.
+    limits.max_alloc = Some(budget.bytes() / 2);
+    reader.limits(limits);
+    let srgb = reader.format() == Some(ImageFormat::Png);
+    let decoded =
+        guard::quietly(|| reader.decode()).map_err(|panic| ImageError::Panicked { path: path.into(), panic })?;
+    let picture = decoded.map_err(|e| decoding(e.to_string()))?.into_rgb32f();
+    let size = [picture.width(), picture.height()];
+    let mut rgb = picture.into_raw().as_chunks::<3>().0.to_vec();
+    if let Some(bad) = rgb.as_flattened().iter().position(|v| !v.is_finite()) {
+        let (x, y) = (bad / 3 % size[0].max(1) as usize, bad / 3 / size[0].max(1) as usize);
+        return Err(decoding(format!("pixel {x}, {y} is not finite")));
+    }
+    if srgb {
+        rgb.as_flattened_mut().iter_mut().for_each(|v| *v = crate::srgb::decode_srgb(*v));
+    }
+    Ok((size, rgb))
+}
+
 /// Checks early, before anything is rendered, that a picture of this name can be written.
 pub fn check_extension(path: &Path) -> Result<(), ImageError> {
     match extension(path).as_deref() {
@@ -162,5 +195,17 @@ pub fn encode_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<V
     let image = image.expect("one colour for each pixel");
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write_to(&mut bytes, format).map_err(|source| ImageError::Encode { path: path.into(), source })?;
+    Ok(bytes.into_inner())
+}
+
+/// A picture of sRGB bytes, row by row, as .png; `path` stands in messages.
+///
+/// # Errors
+/// [`ImageError::Encode`].
+pub fn encode_srgb_png(path: &Path, size: [u32; 2], rgb: &[[u8; 3]]) -> Result<Vec<u8>, ImageError> {
+    let encode = |source| ImageError::Encode { path: path.into(), source };
+    let mut bytes = Cursor::new(Vec::new());
+    let image = image::RgbImage::from_raw(size[0], size[1], rgb.as_flattened().to_vec());
+    image.expect("one colour for each pixel").write_to(&mut bytes, ImageFormat::Png).map_err(encode)?;
     Ok(bytes.into_inner())
 }

@@ -1,6 +1,6 @@
 //! Particle files and images.
 pub mod budget;
-mod guard;
+pub(crate) mod guard;
 pub mod images;
 pub mod particles;
 pub mod quote;

@@ -218,11 +218,7 @@ pub fn read_bytes(name: &Path, bytes: &[u8], budget: &Budget) -> Result<Particle
     if bytes.is_empty() {
         return Err(ReadError::Empty { path: name.into() });
     }
-    let ledger =
-        Ledger::new(*budget, bytes.len() as u64).map_err(|source| ReadError::TooLarge { path: name.into(), source })?;
-    let source = Source { path: name, bytes, ledger: &ledger };
-    let file = guard::quietly(|| reader(&source))
-        .unwrap_or_else(|panic| Err(ReadError::Panicked { path: name.into(), panic }))?;
+    let file = guarded(name, bytes, budget, reader)?;
     let lengths = [
         ("class", file.classes.as_ref().map(Vec::len)),
         ("velocity", file.velocities.as_ref().map(Vec::len)),
@@ -239,6 +235,44 @@ pub fn read_bytes(name: &Path, bytes: &[u8], budget: &Budget) -> Result<Particle
         }
     }
     Ok(file)
+}
+
+/// Arrays N x 3 of an archive.
+#[cfg(feature = "study")]
+pub(crate) struct Triples {
+    /// Those that were asked for; nothing for one that is not there.
+    pub(crate) arrays: Vec<Option<Vec<DVec3>>>,
+    /// The names of all arrays that are there.
+    pub(crate) names: Vec<String>,
+}
+
+/// Arrays N x 3 of a NumPy archive's content by their names; for readers of other things than particles, which share their
+/// guards.
+#[cfg(feature = "study")]
+pub(crate) fn read_triples(name: &Path, bytes: &[u8], wanted: &[&str], budget: &Budget) -> Result<Triples, ReadError> {
+    guarded(name, bytes, budget, |source| numpy::read_triples(source, wanted))
+}
+
+/// Shape and values of a NumPy array's content (.npy) in C order, whatever it is of.
+///
+/// # Errors
+/// As [`read_bytes`].
+#[cfg(feature = "study")]
+pub fn read_array(name: &Path, bytes: &[u8], budget: &Budget) -> Result<(Vec<u64>, Vec<f64>), ReadError> {
+    guarded(name, bytes, budget, numpy::read_values)
+}
+
+/// What `read` makes of a file's content, within a budget, and without panics.
+fn guarded<T>(
+    name: &Path,
+    bytes: &[u8],
+    budget: &Budget,
+    read: impl FnOnce(&Source<'_>) -> Result<T, ReadError>,
+) -> Result<T, ReadError> {
+    let ledger =
+        Ledger::new(*budget, bytes.len() as u64).map_err(|source| ReadError::TooLarge { path: name.into(), source })?;
+    let source = Source { path: name, bytes, ledger: &ledger };
+    guard::quietly(|| read(&source)).unwrap_or_else(|panic| Err(ReadError::Panicked { path: name.into(), panic }))
 }
 
 type Reader = fn(&Source<'_>) -> Result<ParticleFile, ReadError>;

@@ -8,7 +8,13 @@ mod render;
 mod scenes;
 mod settings;
 mod signals;
+#[cfg(feature = "study")]
+mod stress;
+#[cfg(feature = "study")]
+mod study;
 mod terminal;
+#[cfg(feature = "study")]
+mod tune;
 
 use std::{
     fs,

@@ -12,6 +12,8 @@ mod io;
 mod prepare;
 mod shared_blocks;
 mod smooth;
+#[cfg(feature = "study")]
+mod study;
 mod twin_normals;
 mod twin_optics;
 mod twin_plane_fit;

@@ -128,16 +128,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     }
     let instance = Instance::new(false)?;
     let device = instance.pick(args.options.device.as_deref())?;
-    // Older layers do not say that they are there, but the loader was told.
-    let asked = ["VK_INSTANCE_LAYERS", "VK_LOADER_LAYERS_ENABLE"]
-        .into_iter()
-        .find(|name| std::env::var(name).is_ok_and(|layers| layers.to_lowercase().contains("validation")));
-    if let Some(tool) = device.slowed_by.first().map(String::as_str).or(asked) {
-        return Err(format!(
-            "validation is on ({tool}): times would mean nothing. Unset VK_INSTANCE_LAYERS and the like"
-        )
-        .into());
-    }
+    report::refuse_validation(&device)?;
     let size = picture.rendered_size()?;
     let environment = picture.environment()?;
     args.show(&format!(
@@ -238,7 +229,7 @@ fn droplets(count: u32) -> Vec<Vec3> {
 }
 
 /// Milliseconds of what has one name, frame by frame.
-fn sums(frames: &[FrameTimes], name: impl Fn(&PassTime) -> &str) -> Vec<(String, Vec<f64>)> {
+pub fn sums(frames: &[FrameTimes], name: impl Fn(&PassTime) -> &str) -> Vec<(String, Vec<f64>)> {
     let mut all: Vec<(String, Vec<f64>)> = Vec::new();
     for (i, p) in frames.iter().enumerate().flat_map(|(i, f)| f.passes.iter().map(move |p| (i, p))) {
         let found = all.iter().position(|(n, _)| n == name(p)).unwrap_or_else(|| {

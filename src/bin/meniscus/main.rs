@@ -4,8 +4,12 @@
 
 mod bench;
 mod camera;
+#[cfg(feature = "study")]
+mod chart;
 mod choices;
 mod codes;
+#[cfg(feature = "study")]
+mod compare;
 mod dump;
 mod dump_field;
 mod empty;
@@ -19,8 +23,14 @@ mod report;
 mod scene;
 mod scene_file;
 mod stats;
+#[cfg(feature = "study")]
+mod stress;
 mod temporary;
 mod terminal;
+#[cfg(feature = "study")]
+mod truth;
+#[cfg(feature = "study")]
+mod tune;
 
 use clap::{Parser, Subcommand, error::ContextValue};
 use meniscus::host::{DeviceInfo, HostError};
@@ -44,6 +54,21 @@ enum Command {
     Render(Box<render::Args>),
     /// Measure what each pass takes.
     Bench(Box<bench::Args>),
+    /// Path-trace the same scene off-line on the CPU: the truth that pictures are compared with
+    #[cfg(feature = "study")]
+    Truth(Box<truth::Args>),
+    /// Chart speed against accuracy of methods and their parameters
+    #[cfg(feature = "study")]
+    Chart(Box<chart::Args>),
+    /// Measure how far a picture is from a reference
+    #[cfg(feature = "study")]
+    Compare(compare::Args),
+    /// Sweep the cases in which methods fail: curves, and what passes, what fails and why
+    #[cfg(feature = "study")]
+    Stress(stress::Args),
+    /// Find the cheapest settings within an error, or the best within a time, and write them as a scene file
+    #[cfg(feature = "study")]
+    Tune(Box<tune::Args>),
     /// List devices, drivers, features, limits and file formats.
     Info,
 }
@@ -71,6 +96,16 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
     match command {
         Command::Render(args) => render::run(&args),
         Command::Bench(args) => bench::run(&args),
+        #[cfg(feature = "study")]
+        Command::Truth(args) => truth::run(&args),
+        #[cfg(feature = "study")]
+        Command::Chart(args) => chart::run(&args),
+        #[cfg(feature = "study")]
+        Command::Compare(args) => compare::run(&args),
+        #[cfg(feature = "study")]
+        Command::Stress(args) => stress::run(&args),
+        #[cfg(feature = "study")]
+        Command::Tune(args) => tune::run(&args),
         Command::Info => info::run(),
     }
 }

@@ -159,6 +159,12 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     }
 }
 
+/// Makes a folder, if it is not there, that several files are written into one after the other, and checks that they can be.
+#[cfg(feature = "study")]
+pub fn folder(path: &Path) -> Result<(), OutputError> {
+    fs::create_dir_all(path).and_then(|()| temporary::try_out(&fs::canonicalize(path)?)).map_err(failed(path))
+}
+
 /// In every dump: what it is of, and among that the dump's files.
 const FRAME: &str = "frame.json";
 const FILES: &str = "files_of_this_dump";

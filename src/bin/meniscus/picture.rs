@@ -5,7 +5,7 @@ use crate::{
     choices,
     scene::{Prepare, Scene},
 };
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use meniscus::{
     Camera, Equirect, Error, Parameters, Particles, Settings,
     io::{
@@ -153,9 +153,14 @@ impl Picture {
 
     /// The camera, its eye relative to the scene's origin, and the view that it is.
     pub fn camera(&self, scene: &Scene) -> Result<(Camera, Vec3, View), Error> {
+        self.camera_of(scene.origin, &scene.particles)
+    }
+
+    /// [`Picture::camera`] of particles relative to an origin.
+    pub fn camera_of(&self, origin: DVec3, particles: &Particles) -> Result<(Camera, Vec3, View), Error> {
         let aspect = self.size[0].max(1) as f32 / self.size[1].max(1) as f32;
-        let near = 0.1 * scene.particles.radius;
-        let (mut camera, eye, view) = camera::frame(&self.camera, scene.origin, &scene.particles, aspect, near)?;
+        let near = 0.1 * particles.radius;
+        let (mut camera, eye, view) = camera::frame(&self.camera, origin, particles, aspect, near)?;
         camera.environment_rotation = self.environment.rotation.to_radians();
         Ok((camera, eye, view))
     }
@@ -170,6 +175,13 @@ impl Picture {
             settings.liquid.absorption = Vec3::new(1.0, 0.35, 0.2) * per_length;
         }
         settings
+    }
+
+    /// With what was left to the scene as it decides: radius, camera, absorption.
+    pub fn settled(self, scene: &Scene) -> Result<Picture, Error> {
+        let (_, _, camera) = self.camera(scene)?;
+        let (radius, settings) = (shortest(scene.particles.radius), self.settings(&scene.particles));
+        Ok(Picture { radius: Some(radius), camera, settings, absorption_given: true, ..self })
     }
 
     /// Settings of the frame that is rendered.
@@ -199,4 +211,10 @@ impl Picture {
         all.retain(|key, _| !["particles", "settings"].contains(&key.as_str()));
         all
     }
+}
+
+/// A number as few digits say it, which is the same in single precision.
+fn shortest(value: f32) -> f64 {
+    let short = value.to_string().parse().ok().filter(|short| *short as f32 == value);
+    short.unwrap_or(value.into())
 }

@@ -146,23 +146,11 @@ fn announce(scene: &Scene, device: &str, driver: &str) {
 }
 
 fn plan<'a>(args: &'a Args, picture: Picture, scene: &'a Scene) -> Result<Job<'a>, Box<dyn std::error::Error>> {
-    let (camera, eye, view) = picture.camera(scene)?;
+    let (camera, eye, _) = picture.camera(scene)?;
     let settings = picture.frame_settings(&scene.particles)?;
     let size = picture.rendered_size()?;
-    let picture = Picture {
-        radius: Some(shortest(scene.particles.radius)),
-        camera: view,
-        settings: picture.settings(&scene.particles),
-        absorption_given: true,
-        ..picture
-    };
+    let picture = picture.settled(scene)?;
     Ok(Job { args, picture, scene, prepared: None, camera, eye, settings, size, eye_inside: scene.inside(eye) })
-}
-
-/// A number as few digits say it, which is the same in single precision.
-fn shortest(value: f32) -> f64 {
-    let short = value.to_string().parse().ok().filter(|short| *short as f32 == value);
-    short.unwrap_or(value.into())
 }
 
 /// Renders and writes everything; says so if the picture shows none of the liquid.
@@ -215,7 +203,7 @@ fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dy
 }
 
 /// Mean of each n x n block, in linear light.
-fn average(pixels: &[[f32; 3]], size: [u32; 2], n: u32) -> Vec<[f32; 3]> {
+pub fn average(pixels: &[[f32; 3]], size: [u32; 2], n: u32) -> Vec<[f32; 3]> {
     let (width, n) = (size[0] as usize, n as usize);
     let (w, h) = (width / n, size[1] as usize / n);
     let block = |x: usize, y: usize| {

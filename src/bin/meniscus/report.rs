@@ -25,8 +25,22 @@ pub fn check_extension(path: &Path) -> Result<(), String> {
     }
 }
 
+/// Refuses to measure where validation is on.
+pub fn refuse_validation(device: &DeviceInfo) -> Result<(), String> {
+    // Older layers do not say that they are there, but the loader was told.
+    let asked = ["VK_INSTANCE_LAYERS", "VK_LOADER_LAYERS_ENABLE"]
+        .into_iter()
+        .find(|name| std::env::var(name).is_ok_and(|layers| layers.to_lowercase().contains("validation")));
+    match device.slowed_by.first().map(String::as_str).or(asked) {
+        Some(tool) => {
+            Err(format!("validation is on ({tool}): times would mean nothing. Unset VK_INSTANCE_LAYERS and the like"))
+        }
+        None => Ok(()),
+    }
+}
+
 /// Value below which a fraction of the sorted times lies, by linear interpolation.
-fn quantile(times: &[f64], fraction: f64) -> f64 {
+pub fn quantile(times: &[f64], fraction: f64) -> f64 {
     let mut sorted = times.to_vec();
     sorted.sort_by(f64::total_cmp);
     let at = fraction * (sorted.len() - 1) as f64;

@@ -116,6 +116,12 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     temporary.rename(path)
 }
 
+/// Checks that files can be made in a folder.
+#[cfg(feature = "study")]
+pub fn try_out(folder: &Path) -> io::Result<()> {
+    Temporary::file(folder).map(|_| ())
+}
+
 /// A folder that is whole as soon as it is there.
 pub struct Folder {
     path: PathBuf,

@@ -1,8 +1,11 @@
 //! Packed numbers, as VTK, PLY and raw files store them.
 
+use exr::prelude::f16;
+
 /// A number's type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
+    F16,
     F32,
     F64,
     I8,
@@ -37,7 +40,7 @@ impl Kind {
     pub(super) fn size(self) -> usize {
         match self {
             Kind::I8 | Kind::U8 => 1,
-            Kind::I16 | Kind::U16 => 2,
+            Kind::F16 | Kind::I16 | Kind::U16 => 2,
             Kind::F32 | Kind::I32 | Kind::U32 => 4,
             Kind::F64 | Kind::I64 | Kind::U64 => 8,
         }
@@ -51,6 +54,7 @@ impl Kind {
         }
         let bits = u64::from_le_bytes(le);
         match self {
+            Kind::F16 => f16::from_bits(bits as u16).into(),
             Kind::F32 => f32::from_bits(bits as u32).into(),
             Kind::F64 => f64::from_bits(bits),
             Kind::I8 => (bits as i8).into(),
@@ -114,6 +118,7 @@ mod tests {
             decoder.feed(&bytes[cut..], |v| values.push(v));
             assert_eq!((values.as_slice(), decoder.left()), (&[1.5, -2.0, 1e9][..], 0), "{cut}");
         }
+        assert_eq!(Kind::F16.decode(&[0xc1, 0x00], true), -2.5);
         assert_eq!(Kind::I16.decode(&[0xff, 0xfe], true), -2.0);
         assert_eq!(Kind::U64.decode(&[0, 0, 0, 0, 0, 0, 0, 1], true), 1.0);
     }

@@ -5,6 +5,8 @@ use std::io::{Cursor, Read};
 use glam::{DMat3, DVec3};
 use npyz::npz::NpzArchive;
 
+#[cfg(feature = "study")]
+use super::Triples;
 use super::numbers::Decoder;
 use super::numpy_header::{self, Header};
 use super::source::{Source, find};
@@ -37,15 +39,7 @@ pub(super) fn read_npy(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
 
 /// Reads the arrays this crate knows of an archive, compressed or not.
 pub(super) fn read_npz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    check_directory(source)?;
-    let broken = |error: std::io::Error| source.broken("archive", error);
-    let mut archive = NpzArchive::new(Cursor::new(source.bytes)).map_err(broken)?;
-    let mut names: Vec<String> = archive.array_names().map(str::to_owned).collect();
-    names.sort_unstable();
-    let zip = archive.zip_archive();
-    if zip.len() != zip.file_names().count() {
-        return Err(source.malformed(At::Unknown, "archive: two arrays have the same name"));
-    }
+    let (mut archive, names) = open(source)?;
     let Some(position) = POSITIONS.iter().find(|name| names.iter().any(|known| known == *name)) else {
         let found = format!("arrays {}", list(names.iter().map(String::as_str)));
         return Err(source.no_positions("an array named `position` or `points` expected", found));
@@ -62,10 +56,46 @@ pub(super) fn read_npz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     Ok(ParticleFile { positions, radius, support, classes, velocities, axes })
 }
 
+/// The shape and the values of one array, which is in C order.
+#[cfg(feature = "study")]
+pub(super) fn read_values(source: &Source<'_>) -> Result<(Vec<u64>, Vec<f64>), ReadError> {
+    let mut rest = source.bytes;
+    let array = Array::open(source, "array", &mut rest)?;
+    let shape = array.header.shape.clone();
+    if array.header.fortran && shape.len() > 1 {
+        return Err(array.wrong_shape(source, "in C order"));
+    }
+    Ok((shape, array.numbers(source)?))
+}
+
+type Archive<'a> = NpzArchive<Cursor<&'a [u8]>>;
+
+/// An archive, and the names of its arrays.
+fn open<'a>(source: &Source<'a>) -> Result<(Archive<'a>, Vec<String>), ReadError> {
+    check_directory(source)?;
+    let broken = |error: std::io::Error| source.broken("archive", error);
+    let mut archive = NpzArchive::new(Cursor::new(source.bytes)).map_err(broken)?;
+    let mut names: Vec<String> = archive.array_names().map(str::to_owned).collect();
+    names.sort_unstable();
+    let zip = archive.zip_archive();
+    if zip.len() != zip.file_names().count() {
+        return Err(source.malformed(At::Unknown, "archive: two arrays have the same name"));
+    }
+    Ok((archive, names))
+}
+
+/// Arrays N x 3 of an archive by their names.
+#[cfg(feature = "study")]
+pub(super) fn read_triples(source: &Source<'_>, wanted: &[&str]) -> Result<Triples, ReadError> {
+    let (mut archive, names) = open(source)?;
+    let arrays = wanted.iter().map(|name| entry(source, &mut archive, &names, name, |array| array.positions(source)));
+    Ok(Triples { arrays: arrays.collect::<Result<_, _>>()?, names })
+}
+
 /// What `read` makes of the array `name`, if the archive has it. Nothing is unpacked that is not decoded at once.
 fn entry<T>(
     source: &Source<'_>,
-    archive: &mut NpzArchive<Cursor<&[u8]>>,
+    archive: &mut Archive<'_>,
     names: &[String],
     name: &str,
     read: impl FnOnce(Array<'_>) -> Result<T, ReadError>,

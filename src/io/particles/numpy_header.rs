@@ -55,6 +55,7 @@ pub(super) fn read(source: &Source<'_>, name: &str, stream: &mut dyn Read) -> Re
         _ => (false, fields.descr),
     };
     let kind = match number {
+        "f2" => Kind::F16,
         "f4" => Kind::F32,
         "f8" => Kind::F64,
         "i1" => Kind::I8,
@@ -67,7 +68,7 @@ pub(super) fn read(source: &Source<'_>, name: &str, stream: &mut dyn Read) -> Re
         "u8" => Kind::U64,
         _ => {
             let found = format!("of type `{}`", quote(fields.descr));
-            return Err(source.wrong_shape(name, found, "float32, float64 or integers"));
+            return Err(source.wrong_shape(name, found, "float16, float32, float64 or integers"));
         }
     };
     Ok(Header { kind, big_endian, fortran: fields.fortran, shape: fields.shape })

@@ -1,0 +1,219 @@
+//! `meniscus stress`: where methods fail, swept; curves, and a table of what passes, what fails and why.
+
+mod curves;
+
+use crate::{
+    choices, on, options,
+    outputs::{self, OutputError},
+    report,
+    scene::progress,
+    terminal,
+};
+use clap::builder::PossibleValuesParser;
+use meniscus::{
+    Equirect, PRESETS, Settings,
+    host::{Gpu, Instance, Session},
+    study::stress::{CASES, Case, Extent, Fault, Rig, Step},
+};
+use serde_json::{Value, json};
+use std::{error::Error, path::PathBuf, process::ExitCode};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder for curves (.svg), figures (stress.csv, stress.json) and the table (stress.md)
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Methods; all published ones if not given
+    #[arg(long, value_name = "PRESET,...", value_delimiter = ',', value_parser = choices::presets())]
+    pub methods: Vec<String>,
+    /// Of all cases these
+    #[arg(long, value_name = "CASE,...", value_delimiter = ',', long_help = cases_help(), value_parser = names())]
+    pub only: Vec<String>,
+    /// Fewer steps of each case: enough to see one fail
+    #[arg(long)]
+    pub small: bool,
+    /// Device whose name or driver contains this; the best one if not given
+    #[arg(long, value_name = "NAME")]
+    pub device: Option<String>,
+}
+
+fn names() -> PossibleValuesParser {
+    PossibleValuesParser::new(CASES.iter().map(|c| c.name))
+}
+
+fn cases_help() -> String {
+    let each: Vec<_> = CASES.iter().map(|c| format!("{}: {}", c.name, c.about)).collect();
+    format!("Of all cases these:\n{}", each.join("\n"))
+}
+
+/// What a method made of a case.
+pub struct Run {
+    pub case: &'static Case,
+    pub method: &'static str,
+    pub steps: Vec<Step>,
+    pub fault: Option<Fault>,
+}
+
+impl Run {
+    /// Whether the method has a figure that the case is about.
+    fn is_measured(&self) -> bool {
+        self.steps.iter().any(|s| s.found.iter().skip(1).any(Option::is_some))
+    }
+
+    fn verdict(&self) -> &'static str {
+        match self.fault {
+            Some(_) => "fail",
+            None if self.is_measured() => "pass",
+            None => "-",
+        }
+    }
+}
+
+pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
+    let methods = PRESETS.iter().filter(|p| args.methods.is_empty() || args.methods.iter().any(|m| m == p.name));
+    let methods: Vec<_> = methods.map(|p| (p.name, Settings::from(p.method()))).collect();
+    let cases: Vec<_> =
+        CASES.iter().filter(|c| args.only.is_empty() || args.only.iter().any(|o| o == c.name)).collect();
+    outputs::folder(&args.output)?;
+    let instance = Instance::new(false)?;
+    let device = instance.pick(args.device.as_deref())?;
+    terminal::progress(format!("device: {}", device.label()));
+    let on_device = on(&device);
+    let gpu = Gpu::new(&instance, device).map_err(|e| on_device(e.into()))?;
+    let mut session = Session::new(&gpu, [160, 120], &Equirect::procedural_sky()).map_err(|e| on_device(e.into()))?;
+    let extent = if args.small { Extent::Small } else { Extent::Full };
+    let runs = all(&mut session, &cases, &methods, extent);
+    session.end();
+    let runs = runs.map_err(on_device)?;
+    for case in &cases {
+        let own: Vec<_> = runs.iter().filter(|r| r.case.name == case.name).collect();
+        for (measure, name) in case.measures.iter().enumerate().map(|(i, m)| (i, m.name)) {
+            let Some(svg) = curves::draw(case, measure, &own)? else { continue };
+            let file = format!("{}, {}.svg", case.name, name.replace('%', "percent"));
+            outputs::write(&args.output.join(file.replace([' ', ','], "-").replace("--", "-")), svg.as_bytes())?;
+        }
+    }
+    write(args, &gpu.info.label(), &runs)?;
+    for line in table(&cases, &methods, &runs) {
+        terminal::line(line)?;
+    }
+    let broken: Vec<_> =
+        runs.iter().filter(|r| r.case.promised && r.method == PRESETS[0].name && r.fault.is_some()).collect();
+    for r in &broken {
+        terminal::complain(format!(
+            "meniscus: {} does not keep what it promises: {}: {}",
+            r.method,
+            r.case.name,
+            why(r)
+        ));
+    }
+    terminal::progress(format!("wrote {}", args.output.display()));
+    Ok(if broken.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn all(
+    session: &mut Session,
+    cases: &[&'static Case],
+    methods: &[(&'static str, Settings)],
+    extent: Extent,
+) -> Result<Vec<Run>, Box<dyn Error>> {
+    let bar = progress((cases.len() * methods.len()) as u64, "sweeps");
+    let mut rig = Rig::new(session);
+    let mut runs = Vec::new();
+    for case in cases {
+        for (method, settings) in methods {
+            let steps = case.run(&mut rig, settings, extent).map_err(|e| format!("{method}, {}: {e}", case.name))?;
+            let fault = case.fault(&steps);
+            runs.push(Run { case, method, steps, fault });
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    Ok(runs)
+}
+
+/// Why a run fails, in words.
+fn why(run: &Run) -> String {
+    let Some(f) = run.fault else { return String::new() };
+    let m = &run.case.measures[f.measure];
+    format!("{} ({}: {}, at most {}, at {} {})", m.beyond, m.name, short(f.found), m.bound, short(f.x), run.case.x)
+}
+
+/// A figure with as many digits as are worth reading.
+fn short(v: f64) -> String {
+    if v.abs() >= 100.0 || v == v.trunc() { format!("{v:.0}") } else { format!("{v:.2}") }
+}
+
+/// Cases down, methods across, and below what fails and why.
+fn table(cases: &[&'static Case], methods: &[(&'static str, Settings)], runs: &[Run]) -> Vec<String> {
+    let wide = cases.iter().map(|c| c.name.len()).max().unwrap_or(0);
+    let columns: Vec<_> = methods.iter().map(|m| m.0.len().max(6)).collect();
+    let row = |name: &str, cells: Vec<&str>| {
+        let cells: Vec<_> = cells.iter().zip(&columns).map(|(c, w)| format!("{c:<w$}")).collect();
+        format!("| {name:<wide$} | {} |", cells.join(" | "))
+    };
+    let rule: Vec<_> = columns.iter().map(|w| "-".repeat(*w)).collect();
+    let mut lines = vec![
+        row("", methods.iter().map(|m| m.0).collect()),
+        format!("|-{}-|-{}-|", "-".repeat(wide), rule.join("-|-")),
+    ];
+    for case in cases {
+        let own = runs.iter().filter(|r| r.case.name == case.name);
+        lines.push(row(case.name, own.map(Run::verdict).collect()));
+    }
+    lines.push(String::new());
+    lines.extend(
+        runs.iter().filter(|r| r.fault.is_some()).map(|r| format!("- {}, {}: {}", r.case.name, r.method, why(r))),
+    );
+    lines
+}
+
+fn write(args: &Args, device: &str, runs: &[Run]) -> Result<(), OutputError> {
+    let mut csv = String::from("case,method,x,measure,found,bound\n");
+    for r in runs {
+        for step in &r.steps {
+            for (m, found) in r.case.measures.iter().zip(&step.found) {
+                let found = found.map_or(String::new(), |f| f.to_string());
+                csv += &format!("{},{},{},\"{}\",{found},{}\n", r.case.name, r.method, step.x, m.name, m.bound);
+            }
+        }
+    }
+    outputs::write(&args.output.join("stress.csv"), csv.as_bytes())?;
+    let record = json!({
+        "meniscus": env!("CARGO_PKG_VERSION"),
+        "commit": report::COMMIT,
+        "command": options::command(),
+        "device": device,
+        "runs": runs.iter().map(record).collect::<Vec<_>>(),
+    });
+    outputs::write(&args.output.join("stress.json"), format!("{record:#}\n").as_bytes())?;
+    let mut cases: Vec<&'static Case> = Vec::new();
+    let mut methods: Vec<(&'static str, Settings)> = Vec::new();
+    for r in runs {
+        if cases.last().is_none_or(|c| c.name != r.case.name) {
+            cases.push(r.case);
+        }
+        if !methods.iter().any(|m| m.0 == r.method) {
+            methods.push((r.method, Settings::default()));
+        }
+    }
+    let about = cases.iter().map(|c| format!("- **{}**: {}", c.name, c.about)).collect::<Vec<_>>().join("\n");
+    let text = format!("# Where methods fail\n\n{device}\n\n{}\n\n{about}\n", table(&cases, &methods, runs).join("\n"));
+    outputs::write(&args.output.join("stress.md"), text.as_bytes())
+}
+
+fn record(run: &Run) -> Value {
+    let each = |(i, m): (usize, &meniscus::study::stress::Measure)| {
+        // JSON has no infinity: what is no number is null, and fails all the same.
+        json!({"measure": m.name, "bound": m.bound, "found": run.steps.iter().map(|s| s.found[i]).collect::<Vec<_>>()})
+    };
+    json!({
+        "case": run.case.name,
+        "method": run.method,
+        "x": {"what": run.case.x, "at": run.steps.iter().map(|s| s.x).collect::<Vec<_>>()},
+        "figures": run.case.measures.iter().enumerate().map(each).collect::<Vec<_>>(),
+        "promised": run.case.promised,
+        "pass": (run.fault.is_some() || run.is_measured()).then_some(run.fault.is_none()),
+        "why": why(run),
+    })
+}
