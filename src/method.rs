@@ -149,7 +149,7 @@ pub struct Preset {
     pub values: &'static [(&'static str, &'static str)],
 }
 
-/// The published methods; the first is what is drawn when nothing is said.
+/// The published methods, and ours (`field`); the first is what is drawn when nothing is said.
 pub const PRESETS: &[Preset] = &[
     Preset { name: "imai16", members: ["split", "plane-fit", "four"], values: &[] },
     // Reflections inside are followed by none of the papers; the default of `four` goes beyond its own.
@@ -164,6 +164,8 @@ pub const PRESETS: &[Preset] = &[
     // Not the authors' program to the letter: what has no surface is left out of averages, because it has no depth.
     Preset { name: "narrow-range", members: ["front", "narrow-range", "ssfr"], values: &[] },
     Preset { name: "curvature-flow", members: ["front", "curvature-flow", "ssfr"], values: &[] },
+    // Ours: walls everywhere, from a density field.
+    Preset { name: "field", members: ["field", "none", "four"], values: &[] },
 ];
 
 impl Preset {

@@ -106,9 +106,9 @@ fn render_moving(
     speeds: &[f32],
     change: &dyn for<'b> Fn(FrameInput<'b>) -> FrameInput<'b>,
 ) -> Vec<[f32; 3]> {
+    driver.give(case);
     let session = &mut *driver.session.borrow_mut();
     session.renderer.inspect(Inspection::default());
-    session.renderer.set_particles(&case.particles).expect("particles");
     if !speeds.is_empty() {
         session.renderer.set_speeds(speeds).expect("speeds");
     }

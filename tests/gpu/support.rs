@@ -98,7 +98,7 @@ impl<'a> Driver<'a> {
     }
 
     /// Gives the case's particles, with what its layers ask for.
-    fn give(&self, case: &Case) {
+    pub fn give(&self, case: &Case) {
         let renderer = &mut self.session.borrow_mut().renderer;
         renderer.set_particles(&case.particles).expect("particles");
         if let Layers::Field(_) = case.settings.method.layers {

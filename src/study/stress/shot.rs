@@ -2,10 +2,11 @@
 
 use super::StressError;
 use crate::{
-    Camera, FrameInput, Particles, Settings,
+    Camera, Class, FrameInput, Particles, Point, Settings,
     host::{HostError, Session},
     inspect::{self, Inspection, Walk},
-    prepare::{Input, Options, prepare},
+    layers::Layers,
+    prepare::{self, Input, Options, PrepareError, prepare},
     shader::{Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_SIDE_WALL},
     space::Space,
     srgb::encode_srgb,
@@ -81,13 +82,29 @@ impl<'a, 'b> Rig<'a, 'b> {
         settings: &Settings,
     ) -> Result<Shot, StressError> {
         let (particles, _) = prepare(&Input::new(positions, radius), &Options::default())?;
-        Ok(self.draw(&particles, view, settings)?)
+        let input = Input::new(positions, radius);
+        let points = is_field(settings).then(|| prepare::points(&input, &Options::default())).transpose()?;
+        Ok(self.frame(&particles, points.as_deref(), view, settings)?)
     }
 
     /// A frame of particles as they are.
-    pub fn draw(&mut self, particles: &Particles, view: &View, settings: &Settings) -> Result<Shot, HostError> {
+    pub fn draw(&mut self, particles: &Particles, view: &View, settings: &Settings) -> Result<Shot, StressError> {
+        let points = is_field(settings).then(|| points(particles)).transpose()?;
+        Ok(self.frame(particles, points.as_deref(), view, settings)?)
+    }
+
+    fn frame(
+        &mut self,
+        particles: &Particles,
+        points: Option<&[Point]>,
+        view: &View,
+        settings: &Settings,
+    ) -> Result<Shot, HostError> {
         let session = &mut *self.session;
         session.renderer.set_particles(particles)?;
+        if let Some(points) = points {
+            session.renderer.set_points(points)?;
+        }
         let walks = Walk::of(&settings.method.optics).is_some();
         session.renderer.inspect(Inspection { walks, ..Inspection::default() });
         session.resize(view.size)?;
@@ -127,6 +144,18 @@ impl<'a, 'b> Rig<'a, 'b> {
         shot.take_front(space.radius);
         Ok(shot)
     }
+}
+
+fn is_field(settings: &Settings) -> bool {
+    matches!(settings.method.layers, Layers::Field(_))
+}
+
+/// What a density field is made of: particles where they are drawn, in the classes that they have.
+fn points(particles: &Particles) -> Result<Vec<Point>, PrepareError> {
+    let positions: Vec<Vec3> = particles.ellipsoids.iter().map(|e| e.center).collect();
+    let class = |i| if i < particles.splash_count { Class::Splash } else { Class::Body };
+    let classes: Vec<Class> = (0..positions.len()).map(class).collect();
+    prepare::points(&Input::new(&positions, particles.radius).classes(Some(&classes)), &Options::default())
 }
 
 impl Shot {

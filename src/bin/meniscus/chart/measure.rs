@@ -13,9 +13,10 @@ use crate::{
     truth::Truth,
 };
 use meniscus::{
-    Camera, FrameInput,
+    Camera, FrameInput, Settings,
     host::Session,
     io::images,
+    layers::Layers,
     profile::FrameTimes,
     study::measures::{self, Linear},
 };
@@ -43,7 +44,10 @@ pub fn all(
     store: &Store,
     session: &mut Session,
 ) -> Result<Vec<(String, Point)>, Box<dyn Error>> {
-    let upload = job.scene.give(job.picture.preparer(), session)?;
+    // A density field is made of other things than maps are.
+    let of_points = |settings: &Settings| matches!(settings.method.layers, Layers::Field(_));
+    let mut given = None;
+    let mut upload = None;
     let (camera, eye, _) = job.picture.camera(job.scene)?;
     let protocol = format!("{} {} {}", job.frames, job.rounds, job.picture.supersample);
     let parts = [job.name, &job.truth.key, job.device, crate::report::COMMIT, &protocol];
@@ -60,6 +64,10 @@ pub fn all(
             }
             let picture = Picture { settings: way.settings, ..job.picture.clone() };
             let settings = picture.frame_settings(&job.scene.particles)?;
+            if given != Some(of_points(&settings)) {
+                upload = job.scene.give(job.picture.preparer(), &settings, session)?;
+                given = Some(of_points(&settings));
+            }
             let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
             input.eye_inside = job.scene.inside(eye);
             input.positions = upload.as_ref().map(|u| job.scene.on_device(u));
