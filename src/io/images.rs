@@ -10,7 +10,7 @@ pub use map::reduction;
 use super::budget::{Budget, OverBudget};
 use super::{guard, quote};
 use crate::{Equirect, Error};
-use image::{DynamicImage, ImageFormat};
+use image::ImageFormat;
 use map::{Fault, Frame};
 use std::{
     fs::File,
@@ -181,21 +181,17 @@ fn extension(path: &Path) -> Option<String> {
 
 /// The bytes of a picture from linear RGB, as the extension of its name says: .png (sRGB, 8 bits) or .exr (linear, float).
 pub fn encode_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<Vec<u8>, ImageError> {
-    let (image, format) = match extension(path).as_deref() {
+    match extension(path).as_deref() {
         Some("png") => {
-            let bytes = rgb.iter().flatten().map(|v| crate::srgb::srgb_byte(*v)).collect();
-            (image::RgbImage::from_raw(size[0], size[1], bytes).map(DynamicImage::from), ImageFormat::Png)
+            let bytes: Vec<_> = rgb.iter().map(|c| c.map(crate::srgb::srgb_byte)).collect();
+            encode_srgb_png(path, size, &bytes)
         }
-        Some("exr") => {
-            let floats = rgb.iter().flatten().copied().collect();
-            (image::Rgb32FImage::from_raw(size[0], size[1], floats).map(DynamicImage::from), ImageFormat::OpenExr)
-        }
-        _ => return Err(ImageError::Extension(path.into())),
-    };
-    let image = image.expect("one colour for each pixel");
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    image.write_to(&mut bytes, format).map_err(|source| ImageError::Encode { path: path.into(), source })?;
-    Ok(bytes.into_inner())
+        Some("exr") => exr::write(size, rgb).map_err(|e| {
+            let source = image::ImageError::IoError(std::io::Error::other(e));
+            ImageError::Encode { path: path.into(), source }
+        }),
+        _ => Err(ImageError::Extension(path.into())),
+    }
 }
 
 /// A picture of sRGB bytes, row by row, as .png; `path` stands in messages.

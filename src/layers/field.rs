@@ -27,7 +27,7 @@ parameters! {
         /// Distance of the grid's nodes; ours, by measurement: half as much changes little and has eight times the nodes
         spacing: f32 = 2.0, "particle radii", "1.5 to 3" => |s| (1.5..=3.0).contains(s);
         /// How far a particle reaches; ours, by measurement
-        kernel: f32 = 5.5, "particle radii", "3 to 6" => |k| (3.0..=6.0).contains(k);
+        kernel_radius: f32 = 5.5, "particle radii", "3 to 6" => |k| (3.0..=6.0).contains(k);
         /// Density of the surface, as a part of a filled body's; ours: it lies one radius above the outermost particles
         level: f32 = 0.57, "", "0.05 to 0.95" => |l| (0.05..=0.95).contains(l);
         /// What there is room for in proportion to the particles, whose own volume is (2 r)³ each: bricks of 64 nodes. Bricks
@@ -87,8 +87,8 @@ impl Field {
             slots: (3 * bricks).next_power_of_two().clamp(64, 1 << 26) as u32,
             ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count) as u32,
             spacing: self.spacing * (radius * unit),
-            reach: self.kernel / self.spacing,
-            unit: (f64::from(FIELD_ONE) / rest_density(f64::from(self.kernel))) as f32,
+            reach: self.kernel_radius / self.spacing,
+            unit: (f64::from(FIELD_ONE) / rest_density(f64::from(self.kernel_radius))) as f32,
             ball: SPLASH_RADIUS / self.spacing,
             level: (self.level * FIELD_ONE as f32).round() as u32,
             origin_x: origin.x,

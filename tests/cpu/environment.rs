@@ -5,7 +5,10 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageFormat, RgbImage};
 use meniscus::io::Budget;
-use meniscus::io::images::{ImageError, environment_from_bytes, read_environment, read_environment_within, reduction};
+use meniscus::io::images::{
+    ImageError, encode_picture, environment_from_bytes, read_environment, read_environment_within, read_picture,
+    reduction,
+};
 use meniscus::twin::optics::decode_srgb;
 use meniscus::{Equirect, EquirectBuilder};
 
@@ -219,4 +222,20 @@ fn maps_come_through_pipes_too() {
     std::os::unix::fs::symlink("/dev/zero", &endless).expect("a link");
     let error = read_environment_within(&endless, None, &Budget::new(8 << 20)).expect_err("no end");
     assert!(matches!(error, ImageError::TooLarge { .. }), "{error}");
+}
+
+/// Packed in parallel, and still the same file from run to run.
+#[test]
+fn a_picture_is_written_to_the_same_bytes() {
+    let [width, height] = [300, 200];
+    let value = |i: u32| (f32::from_bits(0x3f80_0000 | (i.wrapping_mul(2_654_435_761) >> 9)) - 1.0) * 4.0;
+    let picture: Vec<[f32; 3]> = (0..width * height).map(|i| [value(i), value(i + 7), -value(i + 9)]).collect();
+    let encode = || encode_picture(Path::new("a.exr"), [width, height], &picture).expect("encoded");
+    let first = encode();
+    assert!((0..20).all(|_| encode() == first));
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("a.exr");
+    std::fs::write(&path, &first).expect("written");
+    let read = read_picture(&path, &Budget::default()).expect("read");
+    assert!(read == ([width, height], picture));
 }

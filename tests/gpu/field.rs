@@ -183,7 +183,7 @@ fn check(shot: &Shot, points: &[Vec4], lattice: &Lattice, label: &str) {
 #[test]
 fn nodes_bricks_and_flags_are_the_twins() {
     for (name, radius, positions) in clouds() {
-        for field in [Field::default(), Field::default().spacing(1.5).kernel(4.0).level(0.4)] {
+        for field in [Field::default(), Field::default().spacing(1.5).kernel_radius(4.0).level(0.4)] {
             let lattice = Lattice::new(&field, radius);
             let case = Case { settings: settings(field, "one"), ..empty(radius) };
             each_driver(|driver| {

@@ -1,4 +1,4 @@
-//! OpenEXR environment maps, block by block, by exr.
+//! OpenEXR environment maps, block by block, and pictures, by exr.
 
 use std::collections::HashSet;
 use std::io::{BufRead, Seek};
@@ -89,6 +89,20 @@ fn block_bytes(header: &Header) -> u64 {
     [size.width(), size.height()]
         .iter()
         .fold(header.channels.bytes_per_pixel as u64, |n, m| n.saturating_mul(*m as u64))
+}
+
+/// A picture of linear light, row by row, as 32-bit floats. The same picture has the same bytes: blocks, which are packed in
+/// parallel, come in the order of their rows.
+pub(super) fn write([width, height]: [u32; 2], rgb: &[[f32; 3]]) -> exr::error::Result<Vec<u8>> {
+    use exr::prelude::*;
+    let size = Vec2(width as usize, height as usize);
+    let color = |at: Vec2<usize>| <(f32, f32, f32)>::from(rgb[at.y() * size.width() + at.x()]);
+    let encoding =
+        Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let layer = Layer::new(size, LayerAttributes::default(), encoding, SpecificChannels::rgb(color));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    Image::from_layer(layer).write().to_buffered(&mut bytes)?;
+    Ok(bytes.into_inner())
 }
 
 /// Blocks of the full size in each direction.

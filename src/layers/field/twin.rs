@@ -38,9 +38,9 @@ impl Lattice {
         let radius = radius * power_of_two(radius);
         Lattice {
             spacing: f64::from(field.spacing * radius),
-            support: f64::from(field.kernel) * f64::from(radius),
+            support: f64::from(field.kernel_radius) * f64::from(radius),
             ball: f64::from(SPLASH_RADIUS) * f64::from(radius),
-            rest: rest_density(f64::from(field.kernel)),
+            rest: rest_density(f64::from(field.kernel_radius)),
             level: f64::from(field.level),
         }
     }
