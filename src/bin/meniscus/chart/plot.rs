@@ -8,7 +8,7 @@ use std::error::Error;
 const SIZE: (u32, u32) = (1100, 700);
 const FONT: &str = "sans-serif";
 /// Colours that people who see fewer of them tell apart (Okabe and Ito 2008).
-const COLORS: [RGBColor; 7] = [
+const COLORS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -16,6 +16,7 @@ const COLORS: [RGBColor; 7] = [
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
     RGBColor(90, 90, 90),
+    RGBColor(200, 0, 40),
 ];
 
 /// Why a chart could not be drawn.
