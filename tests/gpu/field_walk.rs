@@ -9,8 +9,9 @@ use crate::{
 };
 use glam::{DVec3, Vec3};
 use meniscus::{
-    Background,
+    Background, Class, Point,
     layers::{Layers, field::Field},
+    prepare::{Input, Options, points},
     shader::{
         Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED, OUTCOME_REFLECTION_LIMIT,
         OUTCOME_SCENE, PATTERN_BODY, PATTERN_NONE, PATTERN_SPLASH,
@@ -117,13 +118,16 @@ fn same(a: &Walk, b: &Walk) -> bool {
 }
 
 fn compare(driver: &Driver, case: &Case, every: usize) -> Vec<Walk> {
-    let shot = shoot(driver, case);
-    let found = walked(&shot);
-    let bricks = words(&shot).bricks();
+    compare_shot(driver, case, &shoot(driver, case), every)
+}
+
+fn compare_shot(driver: &Driver, case: &Case, shot: &Shot, every: usize) -> Vec<Walk> {
+    let found = walked(shot);
+    let bricks = words(shot).bricks();
     let Layers::Field(own) = case.settings.method.layers else { unreachable!("a field") };
     let shifted = [-1e-4, 1e-4].map(|off| Frame { ior: shot.frame.ior * (1.0 + off), ..shot.frame });
     let pair = |i: usize| {
-        let twin = |frame: &Frame| walk_in(&shot, &bricks, own, case, frame, None, i);
+        let twin = |frame: &Frame| walk_in(shot, &bricks, own, case, frame, None, i);
         let wanted = twin(&shot.frame);
         // Where the twin itself goes another way with an index that is a little off, rounding decides.
         let decided = same(&found[i], &wanted) || shifted.iter().all(|frame| same(&twin(frame), &wanted));
@@ -185,6 +189,20 @@ fn rays_are_walked_as_the_twin_walks_them() {
             driver.name
         );
         assert_eq!(count(&|w| [OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED].contains(&w.outcome)), 0, "{}", driver.name);
+    });
+}
+
+/// Balls that stand in the body's face hand rays over to it: between liquid and liquid there is no wall.
+#[test]
+fn balls_in_the_bodys_face_hand_rays_over() {
+    let case = case(Field::default(), 4, 4);
+    let mut all = points(&Input::new(&scene(), case.particles.radius), &Options::default()).expect("valid");
+    let face = |p: &Point| (-0.15..-0.05).contains(&p.position.y) && p.class == Class::Body;
+    all.iter_mut().filter(|p| face(p)).step_by(3).for_each(|p| p.class = Class::Splash);
+    each_driver(|driver| {
+        let found = compare_shot(driver, &case, &driver.shoot_points(&case, &all), 11);
+        let from_ball = found.iter().filter(|w| w.pattern >= PATTERN_SPLASH && w.outcome == OUTCOME_HIT).count();
+        assert!(from_ball > 1000, "{}: {from_ball}", driver.name);
     });
 }
 
