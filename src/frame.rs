@@ -24,15 +24,16 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
     let mut surfaces = Surfaces::default();
     if scene.count > 0 {
         plan.work_for(Home::Particles, "particles");
+        // From positions on the device: their box, their neighbours (Im16 §III).
+        let sorted = scene.prepare.as_ref().map(|p| {
+            let extent = extent::record(&mut plan, scene, &p.constants);
+            (p, extent, sort::record(&mut plan, scene, p, extent))
+        });
         match method.layers.member().kind() {
             Kind::Maps(maps) => {
-                let particles = match &scene.prepare {
-                    // From positions on the device: their box, their neighbours (Im16 §III), classes and ellipsoids (YuTurk13).
-                    Some(p) => {
-                        let extent = extent::record(&mut plan, scene, &p.constants);
-                        let sorted = sort::record(&mut plan, scene, p, extent);
-                        shape::record(&mut plan, scene, p, extent, &sorted)
-                    }
+                let particles = match &sorted {
+                    // Classes and ellipsoids (YuTurk13).
+                    Some((p, extent, sorted)) => shape::record(&mut plan, scene, p, *extent, sorted),
                     None => Arrays::given(&mut plan),
                 };
 
@@ -54,13 +55,9 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
                 plan.work_at(Scale::Full);
             }
             Kind::Field(field) => {
-                let points = match &scene.prepare {
+                let points = match &sorted {
                     // The same without ellipsoids: nobody draws them.
-                    Some(p) => {
-                        let extent = extent::record(&mut plan, scene, &p.constants);
-                        let sorted = sort::record(&mut plan, scene, p, extent);
-                        shape::points(&mut plan, scene, p, extent, &sorted)
-                    }
+                    Some((p, extent, sorted)) => shape::points(&mut plan, scene, p, *extent, sorted),
                     None => Points::given(&mut plan),
                 };
                 // A density field around them (Iwasaki06), whose level is the surface.

@@ -96,6 +96,11 @@ pub fn times(point: &Point) -> [f64; 3] {
     [0.5, 0.05, 0.95].map(|fraction| quantile(&times, fraction))
 }
 
+/// The points that nothing beats in both time and error, by rising time.
+pub fn unbeaten(points: &[(String, Point)]) -> Vec<usize> {
+    front(&points.iter().map(|(_, p)| (times(p)[0], p.liquid.flip)).collect::<Vec<_>>())
+}
+
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let scenes = args.pictures()?;
     let plans: Vec<_> = scenes.iter().map(|(_, picture)| args.ways(picture)).collect::<Result<_, _>>()?;
@@ -203,7 +208,7 @@ impl Args {
         let points = measure::all(&job, ways, store, &mut session);
         session.end();
         let points = points?;
-        let front = front(&points.iter().map(|(_, p)| (times(p)[0], p.liquid.flip)).collect::<Vec<_>>());
+        let front = unbeaten(&points);
         Ok(Charted {
             name: name.to_owned(),
             particles: scene.positions.len(),

@@ -93,8 +93,9 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
             outputs::write(&args.output.join(file.replace([' ', ','], "-").replace("--", "-")), svg.as_bytes())?;
         }
     }
-    write(args, &gpu.info.label(), &runs)?;
-    for line in table(&cases, &methods, &runs) {
+    let table = table(&cases, &methods, &runs);
+    write(args, &gpu.info.label(), &cases, &table, &runs)?;
+    for line in table {
         terminal::line(line)?;
     }
     let broken: Vec<_> =
@@ -168,7 +169,7 @@ fn table(cases: &[&'static Case], methods: &[(&'static str, Settings)], runs: &[
     lines
 }
 
-fn write(args: &Args, device: &str, runs: &[Run]) -> Result<(), OutputError> {
+fn write(args: &Args, device: &str, cases: &[&Case], table: &[String], runs: &[Run]) -> Result<(), OutputError> {
     let mut csv = String::from("case,method,x,measure,found,bound\n");
     for r in runs {
         for step in &r.steps {
@@ -187,18 +188,8 @@ fn write(args: &Args, device: &str, runs: &[Run]) -> Result<(), OutputError> {
         "runs": runs.iter().map(record).collect::<Vec<_>>(),
     });
     outputs::write(&args.output.join("stress.json"), format!("{record:#}\n").as_bytes())?;
-    let mut cases: Vec<&'static Case> = Vec::new();
-    let mut methods: Vec<(&'static str, Settings)> = Vec::new();
-    for r in runs {
-        if cases.last().is_none_or(|c| c.name != r.case.name) {
-            cases.push(r.case);
-        }
-        if !methods.iter().any(|m| m.0 == r.method) {
-            methods.push((r.method, Settings::default()));
-        }
-    }
     let about = cases.iter().map(|c| format!("- **{}**: {}", c.name, c.about)).collect::<Vec<_>>().join("\n");
-    let text = format!("# Where methods fail\n\n{device}\n\n{}\n\n{about}\n", table(&cases, &methods, runs).join("\n"));
+    let text = format!("# Where methods fail\n\n{device}\n\n{}\n\n{about}\n", table.join("\n"));
     outputs::write(&args.output.join("stress.md"), text.as_bytes())
 }
 

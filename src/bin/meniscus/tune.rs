@@ -5,7 +5,7 @@ use crate::{
         measure::{self, Job},
         points::{self, Point, Vary, Way},
         store::Store,
-        times,
+        times, unbeaten,
     },
     choices, on,
     options::Options,
@@ -19,7 +19,7 @@ use crate::{
 use meniscus::{
     PRESETS, Settings,
     host::{Gpu, Instance, Session},
-    study::{front::front, reconstruct::SMOOTHING_PASSES},
+    study::reconstruct::SMOOTHING_PASSES,
 };
 use std::{error::Error, path::PathBuf, process::ExitCode};
 
@@ -179,16 +179,18 @@ impl Args {
         let own = job.picture.settings;
         let mut start = vec![(choices::method_name(&own), own)];
         for preset in PRESETS {
-            let settings = self.options.over(job.picture.clone(), Some(preset)).map(|p| p.settings);
             // A parameter that is given may be one that this method has not.
-            start.extend(settings.ok().filter(|s| *s != own).map(|s| (preset.name.to_owned(), s)));
+            let Ok(Picture { settings, .. }) = self.options.over(job.picture.clone(), Some(preset)) else { continue };
+            if !start.iter().any(|(_, known)| *known == settings) {
+                start.push((preset.name.to_owned(), settings));
+            }
         }
         let mut ways = points::ways(&start, &[])?;
         let mut expanded: Vec<Settings> = Vec::new();
         loop {
             ways.truncate(self.most as usize);
             let found = measure::all(job, &ways, store, session)?;
-            let best = front(&found.iter().map(|(_, p)| (times(p)[0], p.liquid.flip)).collect::<Vec<_>>());
+            let best = unbeaten(&found);
             let chosen = goal.choose(&found).ok_or("nothing was measured")?;
             let at = best.iter().position(|i| *i == chosen).unwrap_or(0);
             let beside = best[at.saturating_sub(1)..].iter().take(3).copied();
@@ -199,14 +201,9 @@ impl Args {
             }
             for i in next {
                 expanded.push(ways[i].settings);
-                let more = neighbours(&ways[i])?;
+                let mut more = neighbours(&ways[i])?;
+                more.retain(|new| !ways.iter().any(|w| w.settings == new.settings));
                 ways.extend(more);
-                let mut seen: Vec<Settings> = Vec::new();
-                ways.retain(|w| {
-                    let new = !seen.contains(&w.settings);
-                    seen.push(w.settings);
-                    new
-                });
             }
         }
     }
@@ -228,7 +225,7 @@ fn neighbours(way: &Way) -> Result<Vec<Way>, Box<dyn Error>> {
 
 /// The front and the choice.
 fn show(found: &[(String, Point)], chosen: usize) -> Result<(), terminal::NotWritten> {
-    let mut rows = front(&found.iter().map(|(_, p)| (times(p)[0], p.liquid.flip)).collect::<Vec<_>>());
+    let mut rows = unbeaten(found);
     if !rows.contains(&chosen) {
         rows.push(chosen);
     }
