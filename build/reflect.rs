@@ -57,6 +57,7 @@ const OUTPUT: u32 = 3;
 const PUSH_CONSTANT: u32 = 9;
 const STORAGE_BUFFER: u32 = 12;
 const DIM_CUBE: u32 = 3;
+const DIM_BUFFER: u32 = 5;
 const FRAGMENT: u32 = 4;
 
 /// Image formats of storage images that passes use.
@@ -117,6 +118,10 @@ pub fn interface(words: &[u32]) -> Result<Interface, String> {
             OP_TYPE_INT => drop(m.types.insert(args[0], if args[2] == 0 { Type::Uint } else { Type::Int })),
             OP_TYPE_FLOAT => drop(m.types.insert(args[0], Type::Float(args[1] / 8))),
             OP_TYPE_VECTOR | OP_TYPE_MATRIX => drop(m.types.insert(args[0], Type::Vector(args[1], args[2]))),
+            OP_TYPE_IMAGE if args[2] == DIM_BUFFER => {
+                let known = args[6] != 2 && matches!(m.types.get(&args[1]), Some(Type::Uint));
+                m.types.insert(args[0], Type::Image(if known { "TexelBuffer" } else { "" }.into()));
+            }
             OP_TYPE_IMAGE => {
                 let uint = matches!(m.types.get(&args[1]), Some(Type::Uint));
                 let (kind, cube) = (if args[6] == 2 { "StorageImage" } else { "SampledImage" }, args[2] == DIM_CUBE);
@@ -167,6 +172,9 @@ pub fn interface(words: &[u32]) -> Result<Interface, String> {
             (UNIFORM, _) => format!("UniformBuffer({})", m.bytes(*pointee)),
             (STORAGE_BUFFER, _) => "StorageBuffer".into(),
             (UNIFORM_CONSTANT, Some(Type::Image(kind))) => {
+                if kind.is_empty() {
+                    return Err(format!("binding {index}: of texel buffers only utextureBuffer is known"));
+                }
                 if fragment && kind.starts_with("StorageImage") && !readonly.contains(&variable) {
                     return Err(format!("binding {index}: a fragment shader's storage images are readonly"));
                 }

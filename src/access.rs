@@ -17,6 +17,8 @@ pub enum Access {
     FragmentRead,
     /// Storage-image read in a fragment shader: without levels and samplers, which cost llvmpipe most of a texel's price.
     FragmentStorageRead,
+    /// Texel-buffer read in a fragment shader: llvmpipe reads four words for what one of a storage buffer costs it.
+    FragmentTexelRead,
     /// Uniform block, in any shader.
     UniformRead,
     /// Colour attachment.
@@ -42,7 +44,9 @@ impl Access {
                 (S::COMPUTE_SHADER, A::from_raw(A::SHADER_READ.as_raw() | A::SHADER_WRITE.as_raw()), L::GENERAL)
             }
             Access::VertexRead => (S::VERTEX_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL),
-            Access::FragmentRead => (S::FRAGMENT_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL),
+            Access::FragmentRead | Access::FragmentTexelRead => {
+                (S::FRAGMENT_SHADER, A::SHADER_READ, L::SHADER_READ_ONLY_OPTIMAL)
+            }
             Access::FragmentStorageRead => (S::FRAGMENT_SHADER, A::SHADER_READ, L::GENERAL),
             Access::UniformRead => (
                 S::from_raw(S::VERTEX_SHADER.as_raw() | S::FRAGMENT_SHADER.as_raw() | S::COMPUTE_SHADER.as_raw()),
@@ -75,7 +79,8 @@ impl Access {
             Access::DepthAttachment => Some(U::DEPTH_STENCIL_ATTACHMENT),
             Access::TransferRead => Some(U::TRANSFER_SRC),
             Access::TransferWrite => Some(U::TRANSFER_DST),
-            Access::ComputeReadWrite | Access::VertexRead | Access::UniformRead | Access::IndirectRead => None,
+            Access::ComputeReadWrite | Access::VertexRead | Access::FragmentTexelRead => None,
+            Access::UniformRead | Access::IndirectRead => None,
         }
     }
 
@@ -85,6 +90,7 @@ impl Access {
         match self {
             Access::ComputeRead | Access::ComputeWrite | Access::ComputeReadWrite => Some(U::STORAGE_BUFFER),
             Access::VertexRead | Access::FragmentRead => Some(U::STORAGE_BUFFER),
+            Access::FragmentTexelRead => Some(U::UNIFORM_TEXEL_BUFFER),
             Access::UniformRead => Some(U::UNIFORM_BUFFER),
             Access::IndirectRead => Some(U::INDIRECT_BUFFER),
             Access::TransferRead => Some(U::TRANSFER_SRC),

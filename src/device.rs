@@ -81,6 +81,8 @@ pub(crate) struct Limits {
     pub timestamp_mask: u64,
     /// Largest storage buffer in bytes.
     pub storage_size: u64,
+    /// Largest texel buffer in bytes, four words a texel.
+    pub texels_size: u64,
     /// Largest device-local heap in bytes.
     pub memory: u64,
 }
@@ -155,6 +157,7 @@ impl Host {
             timestamp_period: (bits > 0).then_some(properties.limits.timestamp_period),
             timestamp_mask: if bits >= 64 { u64::MAX } else { (1u64 << bits) - 1 },
             storage_size: u64::from(properties.limits.max_storage_buffer_range),
+            texels_size: 16 * u64::from(properties.limits.max_texel_buffer_elements),
             memory: largest_heap(&memory),
         }
     }

@@ -105,8 +105,9 @@ pub(crate) struct Scene<'a> {
     pub smoothing_steps: Option<u32>,
     /// Whether the device has points larger than a pixel.
     pub points: bool,
-    /// Largest storage buffer in bytes.
+    /// Largest storage buffer in bytes, and texel buffer.
     pub storage_size: u64,
+    pub texels_size: u64,
 }
 
 /// What the preparation on the device is told.
@@ -154,6 +155,7 @@ impl<'a> Scene<'a> {
             smoothing_steps: None,
             points: limits.point_size > 1.0,
             storage_size: limits.storage_size,
+            texels_size: limits.texels_size,
         }
     }
 

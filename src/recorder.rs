@@ -212,13 +212,14 @@ impl Recorder<'_> {
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pool).set_layouts(&layouts);
         // SAFETY: the pool belongs to this slot, whose last frame has completed, and was made for this plan.
         let set = unsafe { device.allocate_descriptor_sets(&info) }.map_err(Error::vulkan("descriptor set"))?[0];
-        let (mut image_infos, mut buffer_infos) = (Vec::new(), Vec::new());
+        let (mut image_infos, mut buffer_infos, mut views) = (Vec::new(), Vec::new(), Vec::new());
         for (b, target, access) in &call.bound {
             match b.kind {
                 Kind::SampledImage(_) | Kind::StorageImage(..) => {
                     let (view, layout) = self.view(*target, *access)?;
                     image_infos.push((b, [vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)]));
                 }
+                Kind::TexelBuffer => views.push((b, [self.texels(*target)?])),
                 _ => {
                     let (buffer, offset, range) = self.buffer(*target)?;
                     buffer_infos.push((b, [vk::DescriptorBufferInfo { buffer, offset, range }]));
@@ -233,7 +234,8 @@ impl Recorder<'_> {
         };
         let images = image_infos.iter().map(|(b, info)| write(b).image_info(info));
         let buffers = buffer_infos.iter().map(|(b, info)| write(b).buffer_info(info));
-        let writes: Vec<_> = images.chain(buffers).collect();
+        let views = views.iter().map(|(b, view)| write(b).texel_buffer_view(view));
+        let writes: Vec<_> = images.chain(buffers).chain(views).collect();
         // SAFETY: the set is new, so not in use; views and buffers are alive.
         unsafe { device.update_descriptor_sets(&writes, &[]) };
         Ok(set)
@@ -305,6 +307,14 @@ impl Recorder<'_> {
                 Resource::Buffer(b) => all(b.handle),
                 Resource::Image(_) => Err(absent("recording", self.plan.resource(target).name)),
             },
+        }
+    }
+
+    /// A buffer as texels.
+    fn texels(&self, target: Target) -> Result<vk::BufferView, Error> {
+        match self.own(target)? {
+            Resource::Buffer(b) => Ok(b.texels),
+            Resource::Image(_) => Err(absent("recording", self.plan.resource(target).name)),
         }
     }
 

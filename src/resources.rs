@@ -20,6 +20,8 @@ pub(crate) struct Image {
 /// A buffer; mapped where it is the host that writes it.
 pub(crate) struct Buffer {
     pub handle: vk::Buffer,
+    /// Its view as a texel buffer, four words a texel; null where it is not used as one.
+    pub texels: vk::BufferView,
     pub bytes: u64,
     allocation: Option<Allocation>,
 }
@@ -174,12 +176,20 @@ impl Buffer {
         let handle = unsafe { host.device.create_buffer(&info, None) }.map_err(Error::vulkan(name))?;
         // SAFETY: the buffer was just made from this device.
         let requirements = unsafe { host.device.get_buffer_memory_requirements(handle) };
-        let mut buffer = Buffer { handle, bytes: requirements.size, allocation: None };
+        let texels = vk::BufferView::null();
+        let mut buffer = Buffer { handle, texels, bytes: requirements.size, allocation: None };
         let bound = allocate(host, name, requirements, location, true).and_then(|allocation| {
             // SAFETY: memory of the buffer's own requirements, bound once, kept until the buffer is destroyed.
             let bound = unsafe { host.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
             buffer.allocation = Some(allocation);
-            bound.map_err(Error::vulkan(name))
+            bound.map_err(Error::vulkan(name))?;
+            if usage.contains(vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER) {
+                let format = vk::Format::R32G32B32A32_UINT;
+                let view = vk::BufferViewCreateInfo::default().buffer(handle).format(format).range(vk::WHOLE_SIZE);
+                // SAFETY: the buffer is bound to memory; the format is one that every device has for this.
+                buffer.texels = unsafe { host.device.create_buffer_view(&view, None) }.map_err(Error::vulkan(name))?;
+            }
+            Ok(())
         });
         if let Err(e) = bound {
             buffer.destroy(host);
@@ -195,8 +205,11 @@ impl Buffer {
     }
 
     pub fn destroy(&mut self, host: &Host) {
-        // SAFETY: callers destroy only what no frame in flight uses.
-        unsafe { host.device.destroy_buffer(self.handle, None) };
+        // SAFETY: callers destroy only what no frame in flight uses; null handles are allowed.
+        unsafe {
+            host.device.destroy_buffer_view(self.texels, None);
+            host.device.destroy_buffer(self.handle, None);
+        }
         free(host, &mut self.allocation);
     }
 }

@@ -52,6 +52,8 @@ pub enum Kind {
     UniformBuffer(u32),
     /// `buffer … {}`.
     StorageBuffer,
+    /// `utextureBuffer`: four words a texel.
+    TexelBuffer,
     /// `sampler`, always the same: nearest, clamped.
     Sampler,
 }
@@ -75,6 +77,7 @@ impl Kind {
             Kind::StorageImage(..) => T::STORAGE_IMAGE,
             Kind::UniformBuffer(_) => T::UNIFORM_BUFFER,
             Kind::StorageBuffer => T::STORAGE_BUFFER,
+            Kind::TexelBuffer => T::UNIFORM_TEXEL_BUFFER,
             Kind::Sampler => T::SAMPLER,
         }
     }

@@ -1,8 +1,8 @@
-// The density field's own space: lengths are spacings of its nodes, places are counted from the node at or before the origin of the
-// liquid's own space.
+// The density field's own space: lengths are spacings of its nodes, places are counted from the first node of the block that has the
+// origin of the liquid's own space.
 layout(set = 0, binding = 1, std430) readonly buffer HeadBlock { FieldHead head; };
 
-ivec3 base_node() { return ivec3(head.base_x, head.base_y, head.base_z); }
+ivec3 base_block() { return ivec3(head.base_x, head.base_y, head.base_z); }
 vec3 field_part() { return vec3(head.part_x, head.part_y, head.part_z); }
 
 vec3 to_field(vec3 eye) {

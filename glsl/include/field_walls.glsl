@@ -1,105 +1,101 @@
 // Walls of the density field and of balls along a ray (docs/methods.md, "Walls in a field"). Lengths here are spacings of the
 // field's nodes, as in field_space.glsl.
-layout(set = 0, binding = 2, std430) readonly buffer TableBlock { uint at[]; } table;
-layout(set = 0, binding = 3, std430) readonly buffer RecordBlock { uint at[]; } records;
-layout(set = 0, binding = 4, std430) readonly buffer NodeBlock { uint at[]; } nodes;
-layout(set = 0, binding = 5, std430) readonly buffer BallBlock { vec4 at[]; } balls;
+//
+// Drivers on CPUs may run a branch for all invocations that go together, even where none takes it, but a loop only while one goes on:
+// what few need to read is in loops here that go round once at most.
+//
+// Where the device has texel buffers as large as the field's buffers these are read as such: that takes less of a CPU's time. Otherwise something
+// small is bound in their place.
+layout(set = 0, binding = 2, std430) readonly buffer TableBlock { uvec4 at[]; } table;
+layout(set = 0, binding = 4, std430) readonly buffer RecordBlock { uvec4 at[]; } records;
+layout(set = 0, binding = 5, std430) readonly buffer CellBlock { uvec4 at[]; } cells;
+layout(set = 0, binding = 13) uniform utextureBuffer table_texels;
+layout(set = 0, binding = 14) uniform utextureBuffer record_texels;
+layout(set = 0, binding = 15) uniform utextureBuffer cell_texels;
+layout(constant_id = 6) const bool TEXELS = false;
+layout(set = 0, binding = 12, std430) readonly buffer BallBlock { uvec2 at[]; } balls;
+uvec4 directory_texel(uint i) {
+    if (TEXELS) return texelFetch(table_texels, int(i));
+    return table.at[i];
+}
+uvec4 record_texel(uint i) {
+    if (TEXELS) return texelFetch(record_texels, int(i));
+    return records.at[i];
+}
+uvec4 cell_texel(uint i) {
+    if (TEXELS) return texelFetch(cell_texels, int(i));
+    return cells.at[i];
+}
+#include "field_directory.glsl"
 
 const float NONE = 1e30; // t of what is not met
+const float BRICK_EDGE = float(FIELD_BRICK), BLOCK_EDGE = float(FIELD_BRICK * FIELD_BRICK);
 
-// The word of a brick's slot; 0 where there is none.
-uint word_of(ivec3 brick) {
-    uint hash = field_hash(brick), tag = field_tag(hash), slot = hash & (push.slots - 1u), word = 0u;
-    bool there = false;
-    for (uint i = 0u; i < FIELD_PROBES && !there; ++i) {
-        word = table.at[slot];
-        there = word == 0u;
-        if (word >> FIELD_TAG == tag) {
-            uint at = FIELD_RECORD * field_number(word) + FIELD_PLACE;
-            there = ivec3(records.at[at], records.at[at + 1u], records.at[at + 2u]) == brick;
-        }
-        slot = (slot + 1u) & (push.slots - 1u);
+// A float without fraction as a whole number, below 2^22 of either sign: there are drivers that convert lane by lane.
+int whole(float f) { return floatBitsToInt(f + 12582912.0) - 0x4b400000; }
+ivec3 whole(vec3 f) { return floatBitsToInt(f + 12582912.0) - 0x4b400000; }
+
+// Of a brick the cells that hold the surface, the number of the first of these and its first ball, each where FIELD_RECORD says.
+uvec4 brick_words(uint brick) { return record_texel(brick * (uint(FIELD_RECORD) / 4u)); }
+uvec2 brick_inside(uint brick) { return record_texel(brick * (uint(FIELD_RECORD) / 4u) + 1u).xy; }
+
+// A block where a ray is: its first node, and of its bricks the first one's number, those that there are, that hold the surface, and into
+// which balls reach.
+struct Block {
+    vec3 low;
+    uint first;
+    uvec2 there;
+    uvec2 surfaces;
+    uvec2 balls;
+};
+const Block NOWHERE = Block(vec3(NONE), 0u, uvec2(0u), uvec2(0u), uvec2(0u));
+bool is_in(vec3 cell, vec3 low, float edge) { return edge * floor(cell * (1.0 / edge)) == low; }
+void look_up(inout Block b, vec3 x) {
+    for (bool look = !is_in(x, b.low, BLOCK_EDGE); look; look = false) {
+        b.low = BLOCK_EDGE * floor(x / BLOCK_EDGE);
+        uvec4 words;
+        uint slot = field_slot(base_block() + whole(b.low / BLOCK_EDGE), base_block(), push.slots, words);
+        b.first = words[FIELD_FIRST_BRICK];
+        b.there = field_there(words);
+        words = directory_texel(FIELD_SLOT_TEXELS * slot + FIELD_SURFACE / 4u);
+        b.surfaces = words.xy;
+        b.balls = words.zw;
     }
-    return there ? word : 0u;
 }
 
-// What the field holds at a node of a brick or one further on along each axis, less the level.
-float corner(uint number, ivec3 local) {
-    ivec3 over = local >> FIELD_BRICK_BITS;
-    uint step = uint(over.x | over.y << 1 | over.z << 2);
-    if (step != 0u) number = records.at[FIELD_RECORD * number + step];
-    return float(nodes.at[FIELD_NODES * number + field_local(local)]) - push.level;
-}
+// A cell or brick among those of its brick or block, by how far from that one's first it lies, as bits count them.
+uint local_of(vec3 from_first) { return uint(whole(dot(from_first, vec3(1.0, BRICK_EDGE, BRICK_EDGE * BRICK_EDGE)))); }
 
-// The corners of a cell: those with the smaller z, then those with the larger.
-struct Cell { vec4 low; vec4 high; };
-Cell cell_at(uint number, ivec3 local) {
-    return Cell(vec4(corner(number, local), corner(number, local + ivec3(1, 0, 0)), corner(number, local + ivec3(0, 1, 0)), corner(number, local + ivec3(1, 1, 0))),
-                vec4(corner(number, local + ivec3(0, 0, 1)), corner(number, local + ivec3(1, 0, 1)), corner(number, local + ivec3(0, 1, 1)), corner(number, local + ivec3(1))));
-}
-
-float trilinear(Cell c, vec3 f) {
-    vec4 z = mix(c.low, c.high, f.z);
+// The k-th half of a cell's words: what its corners hold and their gradients along x, or those along y and z. Of each a byte of each
+// corner, in the first word of those with the smaller z, in the second of those with the larger.
+uvec4 cell_words(uint cell, uint k) { return cell_texel(cell * (uint(FIELD_CELL_RECORD) / 4u) + k); }
+float trilinear(vec4 low, vec4 high, vec3 f) {
+    vec4 z = mix(low, high, f.z);
     vec2 y = mix(z.xy, z.zw, f.y);
     return mix(y.x, y.y, f.x);
 }
+vec4 held(uint word) { return vec4(uvec4(word, word >> 8, word >> 16, word >> 24) & 0xffu) - (float(FIELD_HALF) - 0.5); }
+vec4 slope(uint word) { return vec4(ivec4(word << 24, word << 16, word << 8, word) >> 24); }
 
-// The field less its level at a place.
-float field_at(vec3 x) {
-    vec3 corner = floor(x);
-    ivec3 node = base_node() + ivec3(corner);
-    uint word = word_of(field_brick(node));
-    return word == 0u ? -push.level : trilinear(cell_at(field_number(word), node & (FIELD_BRICK - 1)), x - corner);
+// The field less its level, in no unit, at a place in a cell.
+float field_in(uint cell, vec3 f) {
+    uvec4 words = cell_words(cell, 0u);
+    return trilinear(held(words.x), held(words.y), f);
 }
-
-// Some 4 x 4 x 4 nodes: the first one's place in its brick, and the numbers of that brick and of those next to it.
-struct Nodes {
-    ivec3 first;
-    uint numbers[8];
-};
-float node_at(Nodes n, int x, int y, int z) {
-    ivec3 node = n.first + ivec3(x, y, z), over = field_brick(node);
-    return float(nodes.at[FIELD_NODES * n.numbers[over.x | over.y << 1 | over.z << 2] + field_local(node)]);
-}
-
-// The field's gradient at a place: central differences at the corners of its cell, interpolated as the field is.
-vec3 gradient_at(vec3 x) {
-    vec3 corner = floor(x), f = x - corner, e = 1.0 - f;
-    ivec3 first = base_node() + ivec3(corner) - 1, brick = field_brick(first);
-    Nodes n;
-    n.first = first & (FIELD_BRICK - 1);
-    // One by one where the first one's brick is not there.
-    n.numbers[0] = field_number(word_of(brick));
-    for (int k = 1; k < 8; ++k) n.numbers[k] = records.at[FIELD_RECORD * n.numbers[0] + k];
-    for (int k = 1; k < 8 && n.numbers[0] == 0u; ++k) n.numbers[k] = field_number(word_of(brick + ivec3(k & 1, (k >> 1) & 1, k >> 2)));
-    vec3 gradient = vec3(0.0);
-    // Along x through the cell's corners.
-    for (int k = 0; k < 4; ++k) {
-        bool up_y = (k & 1) == 1, up_z = k > 1;
-        int y = up_y ? 2 : 1, z = up_z ? 2 : 1;
-        vec4 v = vec4(node_at(n, 0, y, z), node_at(n, 1, y, z), node_at(n, 2, y, z), node_at(n, 3, y, z));
-        float weight_y = up_y ? f.y : e.y, weight_z = up_z ? f.z : e.z, middle = e.x * v.y + f.x * v.z;
-        gradient.x += weight_y * weight_z * (e.x * (v.z - v.x) + f.x * (v.w - v.y));
-        gradient.y += (up_y ? e.y : -f.y) * weight_z * middle;
-        gradient.z += weight_y * (up_z ? e.z : -f.z) * middle;
-    }
-    // And before and behind it along y, then along z.
-    for (int k = 0; k < 4; ++k) {
-        bool behind = (k & 1) == 1, up = k > 1;
-        int outer = behind ? 3 : 0, inner = up ? 2 : 1;
-        float along_y = e.x * node_at(n, 1, outer, inner) + f.x * node_at(n, 2, outer, inner);
-        float along_z = e.x * node_at(n, 1, inner, outer) + f.x * node_at(n, 2, inner, outer);
-        gradient.y += (behind ? f.y : -e.y) * (up ? f.z : e.z) * along_y;
-        gradient.z += (behind ? f.z : -e.z) * (up ? f.y : e.y) * along_z;
-    }
-    return gradient;
+// Its gradient, in no unit.
+vec3 gradient_in(uint cell, vec3 f) {
+    uvec4 first = cell_words(cell, 0u), second = cell_words(cell, 1u);
+    return vec3(trilinear(slope(first.z), slope(first.w), f), trilinear(slope(second.x), slope(second.y), f),
+                trilinear(slope(second.z), slope(second.w), f));
 }
 
 // A wall that a ray meets.
 struct Wall {
     float t;
     int cls;     // of the volume whose wall it is
-    vec3 center; // of a ball
+    vec3 place;  // center of a ball; or the first node of the cell in which a wall of the body lies
+    uint cell;   // that cell's number
+    uint ball;   // the first of the brick in which that is
 };
 
 // Where a ray enters and leaves a ball; false where it passes by.
@@ -112,19 +108,16 @@ bool meets_ball(vec3 center, vec3 x, vec3 dir, out vec2 t) {
     return square > 0.0;
 }
 
-// The ball around a place, if there is one; on its sphere does not count.
-bool ball_around(vec3 x, out vec3 center) {
-    ivec3 brick = field_brick(base_node() + ivec3(floor(x)));
-    uint word = word_of(brick), entry = 0u;
-    if (field_has(word, FIELD_BALLS)) entry = records.at[FIELD_RECORD * field_number(word) + FIELD_FIRST_BALL];
-    vec3 corner = vec3((brick << FIELD_BRICK_BITS) - base_node());
+// The first of a brick's balls around a place, if there is one; on its sphere does not count.
+bool ball_around(vec3 x, uint entry, out vec3 center) {
+    vec3 brick = BRICK_EDGE * floor(x / BRICK_EDGE);
     bool found = false;
     for (uint i = 0u; i < FIELD_MOST_BALLS && entry != 0u && !found; ++i) {
-        vec4 ball = balls.at[entry - 1u];
-        center = corner + ball.xyz;
+        uvec2 ball = balls.at[entry - 1u];
+        center = brick + field_ball(ball.x);
         vec3 q = x - center;
         found = dot(q, q) < push.ball * push.ball * (1.0 - BALL_ROUNDING);
-        entry = floatBitsToUint(ball.w);
+        entry = ball.y;
     }
     return found;
 }
@@ -159,65 +152,89 @@ bool falls(vec4 h, inout bool own, out float root) {
 }
 
 // The nearest ball of a brick that a ray from outside meets before `wall`.
-void meet_balls(uint entry, vec3 corner, vec3 x, vec3 dir, inout Wall wall) {
+void meet_balls(uint entry, vec3 brick, vec3 x, vec3 dir, inout Wall wall) {
     for (uint i = 0u; i < FIELD_MOST_BALLS && entry != 0u; ++i) {
-        vec4 ball = balls.at[entry - 1u];
-        vec3 center = corner + ball.xyz;
+        uvec2 ball = balls.at[entry - 1u];
+        vec3 center = brick + field_ball(ball.x);
         vec2 t;
-        if (meets_ball(center, x, dir, t) && t.x > BALL_START && t.x < wall.t) wall = Wall(t.x, CLASS_SPLASH, center);
-        entry = floatBitsToUint(ball.w);
+        if (meets_ball(center, x, dir, t) && t.x > BALL_START && t.x < wall.t) wall = Wall(t.x, CLASS_SPLASH, center, 0u, 0u);
+        entry = ball.y;
     }
 }
 
+// A ray on its way through the lattice.
+struct Course {
+    vec3 x;
+    vec3 dir;
+    vec3 per_dir;
+    vec3 ahead; // 1 on axes along which it goes up, else 0
+    float t;
+    vec3 cell;  // in which it is there: its first node
+};
+// Takes it out of a cube around its cell, by that one's first node and edge.
+void leave(inout Course c, vec3 low, float edge) {
+    vec3 border = (low + edge * c.ahead - c.x) * c.per_dir;
+    float out_of = min(border.x, min(border.y, border.z));
+    c.t = max(c.t, out_of);
+    vec3 next = clamp(floor(c.x + c.t * c.dir), low, low + (edge - 1.0));
+    c.cell = mix(next, low + (edge + 1.0) * c.ahead - 1.0, equal(border, vec3(out_of)));
+}
 // The first wall that a ray meets from x on, from t to `reach`: of the field from within it, or from outside of all liquid of whichever
-// comes first. Without one its t is NONE, and `stopped` says whether steps ran out. Loops within loops, and no branches with
-// fetches: drivers on CPUs may run branches for all invocations that go together, but loops only while one goes on.
-Wall find_wall(vec3 x, vec3 dir, bool inside, float t, float reach, out bool stopped) {
-    Wall wall = Wall(NONE, CLASS_BODY, vec3(0.0));
+// comes first. Without one its t is NONE, and `stopped` says whether steps ran out.
+Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float reach, out bool stopped) {
+    Wall wall = Wall(NONE, CLASS_BODY, vec3(0.0), 0u, 0u);
     float side = inside ? 1.0 : -1.0;
     vec3 per_dir = 1.0 / mix(dir, vec3(1e-20), lessThan(abs(dir), vec3(1e-20)));
-    ivec3 ahead = ivec3(greaterThan(per_dir, vec3(0.0))), base = base_node(), cell = base + ivec3(floor(x + t * dir));
+    Course c = Course(x, dir, per_dir, vec3(greaterThan(per_dir, vec3(0.0))), t, floor(x + t * dir));
     bool own = false, first = true, met = false;
     uint steps = 0u;
-    while (!met && t < min(reach, wall.t) && steps < FIELD_STEPS) {
-        // On to a cell that holds the surface, brick by brick, and in those that hold some of it cell by cell.
+    while (!met && c.t < min(reach, wall.t) && steps < FIELD_STEPS) {
+        // On to a cell that holds the surface: block by block, in those with bricks to stop in brick by brick, in those cell by cell.
         bool at_surface = false;
-        uint number = 0u;
-        vec3 border;
-        while (!at_surface && t < min(reach, wall.t) && steps < FIELD_STEPS) {
+        uint cell = 0u, ball = 0u;
+        while (!at_surface && c.t < min(reach, wall.t) && steps < FIELD_STEPS) {
             ++steps;
-            ivec3 brick = field_brick(cell), corner = brick << FIELD_BRICK_BITS;
-            uint word = word_of(brick);
-            number = field_number(word);
-            uint record = FIELD_RECORD * number;
-            bool surface = field_has(word, FIELD_SURFACE);
-            uvec2 cells = uvec2(0u);
-            if (surface) cells = uvec2(records.at[record + FIELD_CELLS], records.at[record + FIELD_CELLS + 1u]);
-            uint ball = 0u;
-            if (!inside && field_has(word, FIELD_BALLS)) ball = records.at[record + FIELD_FIRST_BALL];
-            meet_balls(ball, vec3(corner - base), x, dir, wall);
-            int edge = surface ? 1 : FIELD_BRICK;
-            bool within = true;
-            while (within && !at_surface) {
-                uint local = field_local(cell);
-                at_surface = surface && ((local < 32u ? cells.x : cells.y) >> (local & 31u) & 1u) != 0u;
-                ivec3 low = surface ? cell : corner;
-                border = (vec3(low + edge * ahead - base) - x) * per_dir;
-                if (!at_surface) {
-                    float out_of = min(border.x, min(border.y, border.z));
-                    t = max(t, out_of);
-                    ivec3 next = clamp(base + ivec3(floor(x + t * dir)), low, low + edge - 1);
-                    cell = mix(next, low + edge * ahead - (1 - ahead), equal(border, vec3(out_of)));
-                    within = field_brick(cell) == brick;
+            look_up(block, c.cell);
+            uvec2 stops = inside ? block.surfaces : block.surfaces | block.balls;
+            float edge = stops == uvec2(0u) ? BLOCK_EDGE : BRICK_EDGE, per_edge = 1.0 / edge;
+            bool stop = false, within = true;
+            vec3 brick = vec3(0.0);
+            uint k = 0u;
+            while (within && !stop) {
+                brick = edge * floor(c.cell * per_edge);
+                k = local_of((brick - block.low) / BRICK_EDGE);
+                stop = field_bit(stops, k);
+                if (!stop) {
+                    leave(c, brick, edge);
+                    within = is_in(c.cell, block.low, BLOCK_EDGE);
                     first = false;
                 }
             }
+            uvec4 words = stop ? brick_words(block.first + field_before(block.there, k)) : uvec4(0u);
+            bool surface = stop && field_bit(block.surfaces, k);
+            uvec2 bits = words.xy;
+            ball = words[FIELD_FIRST_BALL];
+            meet_balls(inside ? 0u : ball, brick, x, dir, wall);
+            edge = surface ? 1.0 : BRICK_EDGE;
+            while (stop && !at_surface) {
+                k = local_of(c.cell - brick);
+                at_surface = field_bit(bits, k);
+                if (!at_surface) {
+                    leave(c, surface ? c.cell : brick, edge);
+                    stop = is_in(c.cell, brick, BRICK_EDGE);
+                    first = false;
+                }
+            }
+            if (at_surface) cell = words[FIELD_FIRST_CELL] + field_before(bits, k);
         }
         if (at_surface) {
-            Cell c = cell_at(number, cell & (FIELD_BRICK - 1));
-            float out_of = min(border.x, min(border.y, border.z)), end = max(out_of, t);
-            vec3 from = x + t * dir - vec3(cell - base), along = (end - t) * dir;
-            vec4 h = side * vec4(trilinear(c, from), trilinear(c, from + along / 3.0), trilinear(c, from + along * (2.0 / 3.0)), trilinear(c, from + along));
+            uvec4 corners = cell_words(cell, 0u);
+            vec4 low = held(corners.x), high = held(corners.y);
+            vec3 place = c.cell, border = (place + c.ahead - x) * per_dir;
+            float begin = c.t, end = max(min(border.x, min(border.y, border.z)), begin);
+            vec3 from = x + begin * dir - place, along = (end - begin) * dir;
+            vec4 h = side * vec4(trilinear(low, high, from), trilinear(low, high, from + along / 3.0),
+                                 trilinear(low, high, from + along * (2.0 / 3.0)), trilinear(low, high, from + along));
             own = own || !first;
             float root;
             met = falls(h, own, root);
@@ -227,19 +244,31 @@ Wall find_wall(vec3 x, vec3 dir, bool inside, float t, float reach, out bool sto
                 root = 0.0;
             }
             first = false;
-            if (met) t = mix(t, end, root);
-            else cell = mix(cell, cell + 2 * ahead - 1, equal(border, vec3(out_of)));
-            t = met ? t : end;
+            leave(c, place, 1.0);
+            if (met) c.t = mix(begin, end, root);
+            if (met && c.t < min(reach, wall.t)) wall = Wall(c.t, CLASS_BODY, place, cell, ball);
         }
     }
-    stopped = !met && t < min(reach, wall.t);
-    if (met && t < min(reach, wall.t)) wall = Wall(t, CLASS_BODY, vec3(0.0));
+    stopped = !met && c.t < min(reach, wall.t);
     return wall;
+}
+
+// Whether a place is in the field; and the first ball of the brick there.
+bool in_field(inout Block block, vec3 x, out uint ball) {
+    look_up(block, x);
+    vec3 cell = floor(x), brick = BRICK_EDGE * floor(cell / BRICK_EDGE);
+    uint k = local_of((brick - block.low) / BRICK_EDGE), local = local_of(cell - brick);
+    // A brick that is not there is number 0, with nothing in it.
+    uint number = field_bit(block.there, k) ? block.first + field_before(block.there, k) : 0u;
+    uvec4 words = brick_words(number);
+    ball = words[FIELD_FIRST_BALL];
+    if (!field_bit(words.xy, local)) return field_bit(brick_inside(number), local);
+    return field_in(words[FIELD_FIRST_CELL] + field_before(words.xy, local), x - cell) >= 0.0;
 }
 
 // The outward normal of a wall at x; against `dir` where the field has none.
 vec3 normal_at(Wall wall, vec3 x, vec3 dir) {
-    vec3 outward = wall.cls == CLASS_SPLASH ? x - wall.center : -gradient_at(x);
+    vec3 outward = wall.cls == CLASS_SPLASH ? x - wall.place : -gradient_in(wall.cell, clamp(x - wall.place, 0.0, 1.0));
     float square = dot(outward, outward);
     return square > 0.0 ? outward * inversesqrt(square) : -dir;
 }

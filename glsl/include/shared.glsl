@@ -244,39 +244,63 @@ struct Prepare {
     uint kept_classes;         // classes that are kept: one for each id, or for each particle
 };
 
-// The density field (docs/methods.md, "Density field"). Nodes along an edge of a brick, as a power of two, and in all of it.
+// The density field (docs/methods.md, "Density field"). Nodes along an edge of a brick, as a power of two, and in all of it; as many
+// bricks are a block's.
 #define FIELD_BRICK_BITS 2
 #define FIELD_BRICK 4
 #define FIELD_NODES 64
-// What a filled body's density is in the whole numbers that nodes hold.
-#define FIELD_ONE 262144
+// What a filled body's density is in the whole numbers that are added up at nodes, of 16 bits each: two nodes beside each other on x share
+// a word.
+#define FIELD_ONE 8192
+#define FIELD_NODE_WORDS 32
+// What a node holds in a cell that the walk looks at: a byte, FIELD_HALF at the level, and its gradient, a byte on each axis, which ends at
+// FIELD_STEEPEST, in filled bodies a spacing.
+#define FIELD_HALF 128
+#define FIELD_STEEPEST 0.75
 // A particle whose number density exceeds that of a filled body so many times counts as one of so much,
 #define FIELD_DENSEST 1.2
-// unless that is less than this part of its own: crowds on one spot, whose sum would outgrow a node.
-#define FIELD_CROWD 0.015625
-// Slots of the directory that are looked at for one brick, at most.
+// unless that is less than this part of its own: crowds, whose sum would outgrow a node (2 in a body however dense, and 4.8
+// around particles on one spot under the narrowest kernel; a node has room for 8).
+#define FIELD_CROWD 0.5
+// The most that one particle adds to a node: below it whatever density the host says.
+#define FIELD_MOST_SHARE 32767.0
+// Slots of the directory that are looked at for one block, at most.
 #define FIELD_PROBES 128
-// A slot of the directory is 0 where it is free; else the number of its brick, and from bit FIELD_FLAGS on what there is in that, and from
-// bit FIELD_TAG on some bits of its hash, never all 0. Bricks without room have the number 0, and nodes of 0.
-#define FIELD_FLAGS 24
-#define FIELD_TAG 27
-// Numbers of bricks end here.
-#define FIELD_MOST_BRICKS 16777215
-// Some of a brick's cells hold the surface.
-#define FIELD_SURFACE 1
-// Some of its nodes are inside, or of those next to them.
-#define FIELD_INSIDE 2
-// There are balls in it.
-#define FIELD_BALLS 4
-// Words of a brick's record: its slot; the numbers of the seven bricks next to it whose nodes its cells have, by which of x, y and z is
-// larger there; one bit for each of its cells that holds the surface; its first ball, from 1 on; its coordinates.
-#define FIELD_RECORD 14
-#define FIELD_CELLS 8
-#define FIELD_FIRST_BALL 10
-#define FIELD_PLACE 11
+// Words of a slot of the directory, which has one more than its slots, without anything: a block's key, 0 where the slot is free; the number of
+// its first brick, after which its others follow; one bit for each brick that there is; one for each of whose cells some hold
+// the surface; one for each into which balls reach; its coordinates. Readers find four words at once.
+#define FIELD_SLOT 12
+#define FIELD_FIRST_BRICK 1
+#define FIELD_THERE 2
+#define FIELD_SURFACE 4
+#define FIELD_BALLS 6
+#define FIELD_PLACE 8
+// A key is 1 more than coordinates from the base block on and this far below, in so many bits each; or where they do not fit FIELD_FAR, and
+// the hash's upper bits: then coordinates are to be compared.
+#define FIELD_KEY_BELOW 512
+#define FIELD_KEY_BITS 10
+#define FIELD_FAR 2147483648
+// Numbers of bricks end here: a node is found by a word.
+#define FIELD_MOST_BRICKS 67108863
+// Words of a brick's record: one bit for each of its cells that holds the surface; the number of the first of these, after which the others
+// follow; its first ball, from 1 on; one bit for each node that is inside; 1 more than its block's slot times FIELD_NODES plus its place in that.
+#define FIELD_RECORD 8
+#define FIELD_CELLS 0
+#define FIELD_FIRST_CELL 2
+#define FIELD_FIRST_BALL 3
+#define FIELD_INSIDE 4
+#define FIELD_HOME 6
+// Words of a cell's record: a byte of each of its corners in two words each, x before y before z: what it holds, its gradient along x, y and z.
+#define FIELD_CELL_RECORD 8
+// Words of a ball in a brick: its center from FIELD_BALL_BELOW before the brick's first node on, in so many steps a spacing, in FIELD_BALL_BITS bits on
+// each axis; the next ball of the brick, from 1 on.
+#define FIELD_BALL 2
+#define FIELD_BALL_BELOW 1
+#define FIELD_BALL_BITS 10
+#define FIELD_BALL_STEPS 128
 // Edge of a tile of the view for which it is known between which depths the field is, in pixels.
 #define FIELD_TILE 8
-// Bricks and cells that a ray is followed through in one go, at most.
+// Blocks and bricks that a ray is followed through in one go, at most.
 #define FIELD_STEPS 4096
 // Balls of one brick that are looked at.
 #define FIELD_MOST_BALLS 4096
@@ -293,7 +317,8 @@ struct FieldBuild {
     uint count;         // points
     uint capacity;      // bricks that there is room for, number 0 among them, which is empty
     uint slots;         // of the directory, a power of two
-    uint ball_capacity; // entries of balls in bricks that there is room for
+    uint cell_capacity; // cells that hold the surface that there is room for
+    uint ball_capacity; // entries of balls in bricks
     float spacing;      // from node to node
     float reach;        // support of the kernel, in spacings
     float unit;         // of a weight of 1, in whole numbers of a node
@@ -311,10 +336,10 @@ struct FieldHead {
     uint groups_z;
     uint bricks;   // there are, number 0 not counted
     uint balls;    // entries of balls in bricks
-    uint base_x;   // node at or before the origin of the liquid's own space, as integers
+    uint base_x;   // block that has the origin of the liquid's own space, as integers
     uint base_y;
     uint base_z;
-    float part_x;  // how far beyond it the origin lies, in spacings
+    float part_x;  // how far beyond that block's first node the origin lies, in spacings
     float part_y;
     float part_z;
 };

@@ -1,8 +1,9 @@
 // The density field as bricks of nodes, where there is any (docs/methods.md, "Density field"). MARK enters the bricks that points reach
-// in the directory, NUMBER numbers them, SCATTER adds each point's share to the nodes that it reaches, as whole numbers, whose sum
-// does not hang on the order, and lists the balls in each brick; LINK finds each brick's neighbours, FINISH which cells hold the surface.
+// in the directory, block by block, NUMBER numbers them, SCATTER adds each point's share to the nodes that it reaches, as whole numbers, whose
+// sum does not hang on the order, and lists the balls in each brick; FINISH finds the cells that hold the surface, and puts together what
+// a walk looks at in them.
 #version 460
-// Compiled with one of: MARK, NUMBER, SCATTER, LINK, FINISH
+// Compiled with one of: MARK, NUMBER, SCATTER, FINISH
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"
@@ -10,111 +11,124 @@
 #include "field.glsl"
 layout(local_size_x = PARTICLE_GROUP) in;
 layout(push_constant) uniform PushBlock { FieldBuild build; };
-#ifndef MARK
+#ifdef FINISH
+layout(set = 0, binding = 1, std430) readonly buffer HeadBlock { FieldHead head; };
+#elif !defined(MARK)
 layout(set = 0, binding = 1, std430) buffer HeadBlock { FieldHead head; };
 #endif
 layout(set = 0, binding = 2, std430) buffer TableBlock { uint at[]; } table;
-#if defined(MARK) || defined(NUMBER) || defined(SCATTER)
-// Positions; w: their number density as a part of a filled body's, negative for balls, 0 where there is nothing.
-layout(set = 0, binding = 3, std430) readonly buffer PointBlock { vec4 at[]; } points;
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 layout(constant_id = 0) const uint COUNTERS = 0; // slot of its first counter
-const uint BRICKS = 0u, BRICKS_LEFT_OUT = 1u, BALLS_LEFT_OUT = 2u;
+const uint BRICKS = 0u, CELLS = 1u, BRICKS_LEFT_OUT = 2u, CELLS_LEFT_OUT = 3u, BALLS_LEFT_OUT = 4u;
+#ifndef FINISH
+// Positions; w: their number density as a part of a filled body's, negative for balls, 0 where there is nothing.
+layout(set = 0, binding = 3, std430) readonly buffer PointBlock { vec4 at[]; } points;
 #endif
-#if !defined(MARK)
-layout(set = 0, binding = 5, std430) buffer RecordBlock { uint at[]; } records;
+#ifndef MARK
+layout(set = 0, binding = 6, std430) buffer RecordBlock { uint at[]; } records;
 #endif
 #if defined(SCATTER) || defined(FINISH)
-layout(set = 0, binding = 6, std430) buffer NodeBlock { uint at[]; } nodes;
+layout(set = 0, binding = 7, std430) buffer NodeBlock { uint at[]; } nodes;
 #endif
 
-#ifdef NUMBER
-layout(set = 0, binding = 7, std430) readonly buffer ExtentBlock { uint at[]; } extent;
+#if defined(MARK) || defined(NUMBER)
+layout(set = 0, binding = 8, std430) readonly buffer ExtentBlock { uint at[]; } extent;
 layout(constant_id = 1) const bool ORIGIN_ON_DEVICE = false; // the liquid's own space begins where the extent pass has found
 #endif
 
-#if defined(MARK) || defined(NUMBER) || defined(SCATTER)
+#ifndef FINISH
 // Node at or before a point, and how far beyond it that lies, in spacings.
 ivec3 node_of(vec3 x, out vec3 part) {
     return ivec3(cell_of(x.x, build.spacing, part.x), cell_of(x.y, build.spacing, part.y), cell_of(x.z, build.spacing, part.z));
 }
 
-// How far a point reaches, in spacings: a particle of the body has a kernel, another is a ball.
-float reach_of(vec4 point) { return point.w < 0.0 ? build.ball : build.reach; }
-
-// The bricks of the cells with a node that a point reaches: from the first on, so many more each way, two at most.
-ivec3 bricks_of(vec4 point, out ivec3 node, out vec3 part, out uvec3 more) {
-    node = node_of(point.xyz, part);
-    float reach = reach_of(point);
-    ivec3 first = field_brick(node + ivec3(floor(part - reach)));
-    more = uvec3(field_brick(node + ivec3(ceil(part + reach)) - 1) - first);
-    return first;
-}
-// One of 27 bricks, as a step from the first.
-uvec3 step_of(uint k) { return uvec3(k / 9u, k / 3u % 3u, k % 3u); }
-
-// Whether a brick's cells lie nearer to a point than its reach.
-bool reaches(ivec3 brick, ivec3 node, vec3 part, float reach) {
-    vec3 low = vec3((brick << FIELD_BRICK_BITS) - node) - part, across = max(max(low, -low - float(FIELD_BRICK)), 0.0);
-    return dot(across, across) < reach * reach;
-}
-#endif
-
-#ifndef MARK
-ivec3 field_place(uint number) {
-    uint at = FIELD_RECORD * number + FIELD_PLACE;
-    return ivec3(records.at[at], records.at[at + 1u], records.at[at + 2u]);
+// A point among the bricks. A particle of the body reaches as far as its kernel, another is a ball.
+struct Reach {
+    ivec3 node;  // at or before it
+    vec3 part;   // how far beyond that it lies, in spacings
+    float reach; // in spacings
+    ivec3 first; // of the bricks of the cells with a node that it reaches
+    ivec3 last;  // two further on at most
+};
+Reach reach_of(vec4 point) {
+    Reach r;
+    r.node = node_of(point.xyz, r.part);
+    r.reach = point.w < 0.0 ? build.ball : build.reach;
+    r.first = field_brick(r.node + ivec3(floor(r.part - r.reach)));
+    r.last = field_brick(r.node + ivec3(ceil(r.part + r.reach)) - 1);
+    return r;
 }
 
-// The number of a brick; 0 where there is none. Until the end no slot has flags, and all are looked at.
-uint number_of(ivec3 brick, out uint slot) {
-    uint hash = field_hash(brick), tag = field_tag(hash);
-    slot = hash & (build.slots - 1u);
-    for (uint i = 0u; i < FIELD_PROBES; ++i) {
-        uint word = table.at[slot];
-        if (word == 0u) return 0u;
-        if (word >> FIELD_TAG == tag && field_place(field_number(word)) == brick) return field_number(word);
-        slot = (slot + 1u) & (build.slots - 1u);
-    }
-    return 0u;
+// Whether a brick's cells lie nearer to the point than it reaches.
+bool reaches(Reach r, ivec3 brick) {
+    vec3 low = vec3((brick << FIELD_BRICK_BITS) - r.node) - r.part, across = max(max(low, -low - float(FIELD_BRICK)), 0.0);
+    return dot(across, across) < r.reach * r.reach;
+}
+
+// The k-th of eight blocks that its bricks can be in.
+ivec3 block_of(Reach r, uint k) { return field_brick(r.first) + ivec3(k & 1u, (k >> 1) & 1u, k >> 2); }
+
+// Its first and last brick in a block; none where one coordinate of the last is smaller.
+void bricks_in(Reach r, ivec3 block, out ivec3 first, out ivec3 last) {
+    first = max(r.first, block << FIELD_BRICK_BITS);
+    last = min(r.last, (block << FIELD_BRICK_BITS) + FIELD_BRICK - 1);
 }
 #endif
+
+uvec4 directory_texel(uint i) { return uvec4(table.at[4u * i], table.at[4u * i + 1u], table.at[4u * i + 2u], table.at[4u * i + 3u]); }
+#include "field_directory.glsl"
 
 #if defined(MARK) || defined(NUMBER)
-// Until bricks are numbered a slot names the point that entered its brick, and which of 27 from that point's first on it is.
-ivec3 brick_named(uint name) {
-    ivec3 node;
-    vec3 part;
-    uvec3 more;
-    return bricks_of(points.at[(name - 1u) / 27u], node, part, more) + ivec3(step_of((name - 1u) % 27u));
+// The node at or before the origin of the liquid's own space, and how far beyond it that lies; the block that has it.
+ivec3 origin_node(out vec3 part) {
+    vec3 origin = vec3(build.origin_x, build.origin_y, build.origin_z);
+    if (ORIGIN_ON_DEVICE)
+        origin = uintBitsToFloat(uvec3(extent.at[EXTENT_ORIGIN], extent.at[EXTENT_ORIGIN + 1], extent.at[EXTENT_ORIGIN + 2]));
+    return node_of(origin, part);
 }
+ivec3 block_of_node(ivec3 node) { return field_brick(field_brick(node)); }
+
+// Until far blocks are numbered their slots name in place of a key the point that entered them, and which of its eight blocks it is.
+ivec3 block_named(uint name) { return block_of(reach_of(points.at[(name - FIELD_FAR) / 8u]), (name - FIELD_FAR) % 8u); }
 #endif
 
 #ifdef MARK
-// Enters a brick, unless it is there.
-void enter(ivec3 brick, uint name) {
-    uint mask = build.slots - 1u, slot = field_hash(brick) & mask;
-    for (uint i = 0u; i < FIELD_PROBES; ++i) {
-        uint found = table.at[slot];
-        if (found == 0u) found = atomicCompSwap(table.at[slot], 0u, name);
-        if (found == 0u || brick_named(found) == brick) return;
+// Enters some of a block's bricks.
+void enter(ivec3 block, ivec3 base, uvec2 bits, uint name) {
+    uint mask = build.slots - 1u, slot = field_hash(block) & mask, key = field_key(block, base), own = key < FIELD_FAR ? key : FIELD_FAR | name;
+    bool done = false;
+    for (uint i = 0u; i < FIELD_PROBES && !done; ++i) {
+        uint at = FIELD_SLOT * slot, found = table.at[at];
+        if (found == 0u) found = atomicCompSwap(table.at[at], 0u, own);
+        done = found == 0u || found == own;
+        for (bool far = !done && own >= FIELD_FAR && found >= FIELD_FAR; far; far = false) done = block_named(found) == block;
+        if (done) {
+            at += FIELD_THERE;
+            if ((bits.x & ~table.at[at]) != 0u) atomicOr(table.at[at], bits.x);
+            if ((bits.y & ~table.at[at + 1u]) != 0u) atomicOr(table.at[at + 1u], bits.y);
+        }
         slot = (slot + 1u) & mask;
     }
-    atomicAdd(counters.at[COUNTERS + BRICKS_LEFT_OUT], 1u);
+    if (!done) atomicAdd(counters.at[COUNTERS + BRICKS_LEFT_OUT], uint(bitCount(bits.x) + bitCount(bits.y)));
 }
 
 void main() {
     uint i = invocation();
     if (i >= build.count || points.at[i].w == 0.0) return;
-    vec4 point = points.at[i];
-    ivec3 node;
+    Reach r = reach_of(points.at[i]);
     vec3 part;
-    uvec3 more;
-    ivec3 first = bricks_of(point, node, part, more);
-    for (uint k = 0u; k < 27u; ++k) {
-        uvec3 step = step_of(k);
-        ivec3 brick = first + ivec3(step);
-        if (all(lessThanEqual(step, more)) && reaches(brick, node, part, reach_of(point))) enter(brick, 27u * i + k + 1u);
+    ivec3 base = block_of_node(origin_node(part));
+    for (uint k = 0u; k < 8u; ++k) {
+        ivec3 block = block_of(r, k), first, last;
+        bricks_in(r, block, first, last);
+        uvec2 bits = uvec2(0u);
+        for (int z = first.z; z <= last.z; ++z)
+            for (int y = first.y; y <= last.y; ++y)
+                for (int x = first.x; x <= last.x; ++x) {
+                    uint local = field_local(ivec3(x, y, z)), bit = reaches(r, ivec3(x, y, z)) ? 1u << (local & 31u) : 0u;
+                    bits |= local < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
+                }
+        for (bool some = bits != uvec2(0u); some; some = false) enter(block, base, bits, 8u * i + k);
     }
 }
 #endif
@@ -123,129 +137,250 @@ void main() {
 void main() {
     uint slot = invocation();
     if (slot >= build.slots) return;
+    vec3 part;
+    ivec3 node = origin_node(part), base = block_of_node(node);
     if (slot == 0u) {
-        vec3 origin = vec3(build.origin_x, build.origin_y, build.origin_z), part;
-        if (ORIGIN_ON_DEVICE)
-            origin = uintBitsToFloat(uvec3(extent.at[EXTENT_ORIGIN], extent.at[EXTENT_ORIGIN + 1], extent.at[EXTENT_ORIGIN + 2]));
-        ivec3 node = node_of(origin, part);
-        head.base_x = uint(node.x);
-        head.base_y = uint(node.y);
-        head.base_z = uint(node.z);
+        part += vec3(node - (base << (2 * FIELD_BRICK_BITS)));
+        head.base_x = uint(base.x);
+        head.base_y = uint(base.y);
+        head.base_z = uint(base.z);
         head.part_x = part.x;
         head.part_y = part.y;
         head.part_z = part.z;
         head.groups_z = 1u;
     }
-    uint name = table.at[slot];
-    if (name == 0u) return;
-    ivec3 brick = brick_named(name);
-    uint tag = field_tag(field_hash(brick)) << FIELD_TAG, number = atomicAdd(head.bricks, 1u) + 1u;
-    if (number >= build.capacity) {
-        table.at[slot] = tag;
-        atomicAdd(counters.at[COUNTERS + BRICKS_LEFT_OUT], 1u);
+    uint at = FIELD_SLOT * slot, key = table.at[at];
+    if (key == 0u) return;
+    ivec3 block;
+    if (key >= FIELD_FAR) {
+        block = block_named(key);
+        table.at[at] = field_key(block, base);
+    } else {
+        const uint mask = (1u << FIELD_KEY_BITS) - 1u;
+        block = base - FIELD_KEY_BELOW + ivec3(uvec3(key - 1u, (key - 1u) >> FIELD_KEY_BITS, (key - 1u) >> (2 * FIELD_KEY_BITS)) & mask);
+    }
+    for (int a = 0; a < 3; ++a) table.at[at + FIELD_PLACE + a] = uint(block[a]);
+    uvec2 there = uvec2(table.at[at + FIELD_THERE], table.at[at + FIELD_THERE + 1u]);
+    uint count = uint(bitCount(there.x) + bitCount(there.y)), first = atomicAdd(head.bricks, count) + 1u;
+    // Without room for all there are none.
+    if (first + count > build.capacity) {
+        table.at[at + FIELD_THERE] = 0u;
+        table.at[at + FIELD_THERE + 1u] = 0u;
+        atomicAdd(counters.at[COUNTERS + BRICKS_LEFT_OUT], count);
         return;
     }
-    table.at[slot] = tag | number;
-    uint record = number * FIELD_RECORD;
-    records.at[record] = slot;
-    for (int a = 0; a < 3; ++a) records.at[record + FIELD_PLACE + a] = uint(brick[a]);
-    atomicAdd(counters.at[COUNTERS + BRICKS], 1u);
+    table.at[at + FIELD_FIRST_BRICK] = first;
+    for (uint k = 0u, brick = first; k < FIELD_NODES; ++k)
+        if (field_bit(there, k)) records.at[FIELD_RECORD * brick++ + FIELD_HOME] = FIELD_NODES * slot + k + 1u;
+    atomicAdd(counters.at[COUNTERS + BRICKS], count);
     // The rectangle of groups that are one a brick.
-    atomicMax(head.groups_x, min(number, MOST_GROUPS));
-    atomicMax(head.groups_y, (number - 1u) / MOST_GROUPS + 1u);
+    uint last = first + count - 1u;
+    atomicMax(head.groups_x, min(last, MOST_GROUPS));
+    atomicMax(head.groups_y, (last - 1u) / MOST_GROUPS + 1u);
 }
 #endif
 
 #ifdef SCATTER
-layout(set = 0, binding = 8, std430) writeonly buffer BallBlock { vec4 at[]; } balls; // center, from its brick's first node on, in spacings; the next, from 1 on
+layout(constant_id = 1) const int ACROSS = 6; // nodes that a kernel can reach on an axis
+layout(set = 0, binding = 8, std430) writeonly buffer BallBlock { uvec2 at[]; } balls;
 
-// Enters a ball in the list of each brick that it reaches.
-void list_ball(ivec3 first, uvec3 more, ivec3 node, vec3 part) {
-    for (uint k = 0u; k < 27u; ++k) {
-        uvec3 step = step_of(k);
-        ivec3 brick = first + ivec3(step);
-        if (any(greaterThan(step, more)) || !reaches(brick, node, part, build.ball)) continue;
-        uint slot, number = number_of(brick, slot);
-        if (number == 0u) continue;
-        uint entry = atomicAdd(head.balls, 1u);
-        if (entry >= build.ball_capacity) {
-            atomicAdd(counters.at[COUNTERS + BALLS_LEFT_OUT], 1u);
-            continue;
-        }
-        atomicOr(table.at[slot], uint(FIELD_BALLS) << FIELD_FLAGS);
-        uint next = atomicExchange(records.at[number * FIELD_RECORD + FIELD_FIRST_BALL], entry + 1u);
-        balls.at[entry] = vec4(vec3(node - (brick << FIELD_BRICK_BITS)) + part, uintBitsToFloat(next));
+// Enters a ball in the list of a brick, the k-th of a slot's block.
+void list_ball(Reach r, ivec3 brick, uint slot, uint k, uint number) {
+    uint entry = atomicAdd(head.balls, 1u);
+    if (entry >= build.ball_capacity) {
+        atomicAdd(counters.at[COUNTERS + BALLS_LEFT_OUT], 1u);
+        return;
     }
+    atomicOr(table.at[FIELD_SLOT * slot + FIELD_BALLS + (k >> 5)], 1u << (k & 31u));
+    uint next = atomicExchange(records.at[number * FIELD_RECORD + FIELD_FIRST_BALL], entry + 1u);
+    balls.at[entry] = uvec2(field_packed_ball(vec3(r.node - (brick << FIELD_BRICK_BITS)) + r.part), next);
 }
+
+// Of the three bricks along each axis those in which a row of nodes lies.
+uvec3 one_of(uvec3 first, uvec3 second, uvec3 third, int which) { return which == 0 ? first : which == 1 ? second : third; }
 
 void main() {
     uint i = invocation();
     if (i >= build.count || points.at[i].w == 0.0) return;
     vec4 point = points.at[i];
-    ivec3 node;
-    vec3 part;
-    uvec3 more;
-    ivec3 first = bricks_of(point, node, part, more);
-    if (point.w < 0.0) {
-        list_ball(first, more, node, part);
-        return;
+    Reach r = reach_of(point);
+    bool ball = point.w < 0.0;
+    // The blocks that it reaches: of each the slot, its first brick and which it has.
+    ivec3 base = ivec3(head.base_x, head.base_y, head.base_z), blocks = field_brick(r.last) - field_brick(r.first);
+    uint slots[8], firsts[8];
+    uvec2 there[8];
+    for (uint b = 0u; b < 8u; ++b) {
+        slots[b] = build.slots;
+        firsts[b] = 0u;
+        there[b] = uvec2(0u);
+        for (bool look = all(lessThanEqual(field_from_local(b & 1u | (b & 2u) << 1 | (b & 4u) << 2), blocks)); look; look = false) {
+            uvec4 words;
+            slots[b] = field_slot(block_of(r, b), base, build.slots, words);
+            firsts[b] = words[FIELD_FIRST_BRICK];
+            there[b] = field_there(words);
+        }
     }
-    uint numbers[27];
-    for (uint k = 0u; k < 27u; ++k) {
-        uint slot;
-        numbers[k] = all(lessThanEqual(step_of(k), more)) ? number_of(first + ivec3(step_of(k)), slot) : 0u;
+    // The numbers of its bricks, by x, in rows by y and z.
+    uvec3 numbers[9];
+    for (int k = 0; k < 27; ++k) {
+        ivec3 brick = r.first + ivec3(k % 3, k / 3 % 3, k / 9), block = field_brick(brick) - field_brick(r.first);
+        int b = block.x | block.y << 1 | block.z << 2;
+        uint local = field_local(brick), number = 0u;
+        if (all(lessThanEqual(brick, r.last)) && field_bit(there[b], local)) number = firsts[b] + field_before(there[b], local);
+        numbers[k / 3][k % 3] = number;
+        for (bool list = ball && number > 0u && reaches(r, brick); list; list = false) list_ball(r, brick, slots[b], local, number);
     }
+    if (ball) return;
     float unit = build.unit / max(min(point.w, FIELD_DENSEST), FIELD_CROWD * point.w), per_reach = 1.0 / build.reach;
     // Nodes from the first that it can reach on, in spacings from the point, and among those of its bricks.
-    ivec3 low = ivec3(floor(part - build.reach)) + 1, at = node + low - (first << FIELD_BRICK_BITS);
-    vec3 offset = vec3(low) - part;
-    const int across = int(ceil(2.0 * build.reach));
-    for (int z = 0; z < across; ++z) {
-        for (int y = 0; y < across; ++y) {
+    ivec3 low = ivec3(floor(r.part - build.reach)) + 1, at = r.node + low - (r.first << FIELD_BRICK_BITS);
+    vec3 offset = vec3(low) - r.part;
+    for (int z = 0; z < ACROSS; ++z) {
+        int z_brick = (at.z + z) >> FIELD_BRICK_BITS;
+        uvec3 plane[3];
+        for (int y = 0; y < 3; ++y) plane[y] = one_of(numbers[y], numbers[3 + y], numbers[6 + y], z_brick);
+        for (int y = 0; y < ACROSS; ++y) {
             vec2 yz = offset.yz + vec2(y, z);
             float row = dot(yz, yz);
-            ivec2 row_at = at.yz + ivec2(y, z), row_brick = field_brick(ivec3(row_at, 0)).xy;
+            ivec2 row_at = at.yz + ivec2(y, z);
             if (row >= build.reach * build.reach) continue;
-            for (int x = 0; x < across; ++x) {
-                float dx = offset.x + float(x), q = sqrt(row + dx * dx) * per_reach, far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
-                uint share = uint(unit * (2.0 * far * far * far - 8.0 * near * near * near) + 0.5);
-                ivec3 own = ivec3(at.x + x, row_at);
-                uint number = numbers[9 * field_brick(own).x + 3 * row_brick.x + row_brick.y];
+            uvec3 row_numbers = one_of(plane[0], plane[1], plane[2], row_at.x >> FIELD_BRICK_BITS);
+            // Two nodes that share a word at a time, from the one that the first shares its word with.
+            for (int pair = 0; pair <= ACROSS / 2; ++pair) {
+                ivec3 own = ivec3((at.x & ~1) + 2 * pair, row_at);
+                vec2 dx = offset.x + float(own.x - at.x) + vec2(0.0, 1.0), q = sqrt(row + dx * dx) * per_reach;
+                vec2 far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
+                // To the nearest whole number by its bits: there are drivers that convert lane by lane.
+                vec2 weight = min(unit * (2.0 * far * far * far - 8.0 * near * near * near), FIELD_MOST_SHARE);
+                uvec2 share = floatBitsToUint(weight + 8388608.0) & 0x7fffffu;
+                int b = own.x >> FIELD_BRICK_BITS;
+                uint number = b == 0 ? row_numbers.x : b == 1 ? row_numbers.y : row_numbers.z, both = share.x | share.y << 16;
                 // Without a number there was no room for the brick.
-                if (share > 0u && number > 0u) atomicAdd(nodes.at[FIELD_NODES * number + field_local(own)], share);
+                if (both > 0u && number > 0u) atomicAdd(nodes.at[FIELD_NODE_WORDS * number + field_local(own) / 2u], both);
             }
         }
     }
 }
 #endif
 
-#ifdef LINK
-void main() {
-    // One group a brick, of which seven have a neighbour each.
-    uint number = group_index() + 1u, k = gl_LocalInvocationIndex;
-    if (number > min(head.bricks, build.capacity - 1u) || k == 0u || k >= 8u) return;
-    uint slot, next = number_of(field_place(number) + ivec3(k & 1u, (k >> 1) & 1u, k >> 2), slot);
-    records.at[number * FIELD_RECORD + k] = next;
-}
-#endif
-
 #ifdef FINISH
+layout(set = 0, binding = 8, std430) writeonly buffer CellBlock { uint at[]; } cells;
+
+// Of a brick's nodes, those up to one before and two beyond them on each axis; and of the corners of its cells.
+const uint AROUND = FIELD_BRICK + 3u, CORNERS = FIELD_BRICK + 1u;
+shared uint numbers[27];                          // of the bricks around it
+shared uint sums[AROUND * AROUND * AROUND];
+shared uint corners[CORNERS * CORNERS * CORNERS]; // four bytes each: what it holds, and its gradient
+shared uint found[2];                             // whether there are corners outside, and inside
+shared uint surface[4];                           // one bit for each cell that holds some; one for each node that is inside
+shared uint first_cell;
+
+uint corner_at(uvec3 local) { return local.x + CORNERS * (local.y + CORNERS * local.z); }
+uint sum_index(uvec3 node) { return node.x + AROUND * (node.y + AROUND * node.z); }
+int sum_at(ivec3 node) { return int(sums[sum_index(uvec3(node))]); }
+
+void find_brick(ivec3 own, ivec3 step) {
+    ivec3 brick = own + step;
+    uvec4 words;
+    field_slot(field_brick(brick), ivec3(head.base_x, head.base_y, head.base_z), build.slots, words);
+    uint local = field_local(brick);
+    uvec2 there = field_there(words);
+    uint number = field_bit(there, local) ? words[FIELD_FIRST_BRICK] + field_before(there, local) : 0u;
+    numbers[step.x + 1 + 3 * (step.y + 1 + 3 * (step.z + 1))] = number;
+}
+
+// Reads the sum of a node, by its place around the brick.
+uint read_sum(uvec3 node) {
+    uvec3 at = node + FIELD_BRICK - 1u, brick = at >> FIELD_BRICK_BITS;
+    uint word = nodes.at[FIELD_NODE_WORDS * numbers[brick.x + 3u * (brick.y + 3u * brick.z)] + field_local(ivec3(at)) / 2u];
+    uint sum = word >> (16u * (at.x & 1u)) & 0xffffu;
+    sums[sum_index(node)] = sum;
+    return sum;
+}
+
+// A node, by its place around the brick.
+uint packed_node(ivec3 node) {
+    uint held = min(uint(sum_at(node)) * FIELD_HALF / build.level, 255u);
+    vec3 gradient = vec3(sum_at(node + ivec3(1, 0, 0)) - sum_at(node - ivec3(1, 0, 0)), sum_at(node + ivec3(0, 1, 0)) - sum_at(node - ivec3(0, 1, 0)),
+                         sum_at(node + ivec3(0, 0, 1)) - sum_at(node - ivec3(0, 0, 1))) / (2.0 * FIELD_STEEPEST * FIELD_ONE);
+    // What is steeper keeps its direction.
+    gradient /= max(1.0, max(abs(gradient.x), max(abs(gradient.y), abs(gradient.z))));
+    return held | packSnorm4x8(vec4(gradient, 0.0)) << 8;
+}
+
+// The k-th bytes of four words.
+uint bytes(uvec4 words, uint k) {
+    uvec4 b = words >> (8u * k) & 0xffu;
+    return b.x | b.y << 8 | b.z << 16 | b.w << 24;
+}
+
+// One group a brick, one invocation a cell.
 void main() {
-    uint number = group_index() + 1u, k = gl_LocalInvocationIndex;
+    uint number = group_index() + 1u, k = gl_LocalInvocationIndex, record = FIELD_RECORD * number;
     if (number > min(head.bricks, build.capacity - 1u)) return;
-    ivec3 cell = ivec3(k & 3u, (k >> FIELD_BRICK_BITS) & 3u, k >> (2 * FIELD_BRICK_BITS));
-    uint inside = 0u, record = number * FIELD_RECORD;
-    for (uint c = 0u; c < 8u; ++c) {
-        ivec3 node = cell + ivec3(c & 1u, (c >> 1) & 1u, c >> 2), over = field_brick(node);
-        uint step = uint(over.x | over.y << 1 | over.z << 2), own = step == 0u ? number : records.at[record + step];
-        if (nodes.at[FIELD_NODES * own + field_local(node)] >= build.level) ++inside;
+    uint home = records.at[record + FIELD_HOME] - 1u, slot = FIELD_SLOT * (home / FIELD_NODES);
+    if (home == 0xffffffffu) return; // a number that no block has got
+    ivec3 place = ivec3(table.at[slot + FIELD_PLACE], table.at[slot + FIELD_PLACE + 1u], table.at[slot + FIELD_PLACE + 2u]);
+    ivec3 own = (place << FIELD_BRICK_BITS) + field_from_local(home);
+    if (k < 8u) find_brick(own, ivec3(k & 1u, (k >> 1) & 1u, k >> 2));
+    if (k < 4u) surface[k] = 0u;
+    if (k < 2u) found[k] = 0u;
+    barrier();
+    for (uint i = k; i < CORNERS * CORNERS * CORNERS; i += FIELD_NODES) {
+        uint inside = uint(read_sum(uvec3(i % CORNERS, i / CORNERS % CORNERS, i / (CORNERS * CORNERS)) + 1u) >= build.level);
+        if (found[inside] == 0u) found[inside] = 1u;
     }
-    uint flags = 0u;
-    if (inside > 0u) flags |= FIELD_INSIDE;
-    if (inside > 0u && inside < 8u) {
-        flags |= FIELD_SURFACE;
-        atomicOr(records.at[record + FIELD_CELLS + (k >> 5)], 1u << (k & 31u));
+    barrier();
+    if (found[0] + found[1] == 1u) {
+        if (k < 2u) records.at[record + FIELD_INSIDE + k] = found[1] * 0xffffffffu;
+        return;
     }
-    if (flags != 0u) atomicOr(table.at[records.at[record]], flags << FIELD_FLAGS);
+    if (k < 27u) {
+        ivec3 step = ivec3(k % 3u, k / 3u % 3u, k / 9u) - 1;
+        if (any(lessThan(step, ivec3(0)))) find_brick(own, step);
+    }
+    barrier();
+    for (uint i = k; i < AROUND * AROUND * AROUND; i += FIELD_NODES) {
+        uvec3 node = uvec3(i % AROUND, i / AROUND % AROUND, i / (AROUND * AROUND));
+        if (any(equal(node, uvec3(0u))) || any(equal(node, uvec3(AROUND - 1u)))) read_sum(node);
+    }
+    barrier();
+    for (uint i = k; i < CORNERS * CORNERS * CORNERS; i += FIELD_NODES)
+        corners[i] = packed_node(ivec3(i % CORNERS, i / CORNERS % CORNERS, i / (CORNERS * CORNERS)) + 1);
+    barrier();
+    uint first = corner_at(uvec3(field_from_local(k)));
+    uvec4 low = uvec4(corners[first], corners[first + 1u], corners[first + CORNERS], corners[first + CORNERS + 1u]);
+    first += CORNERS * CORNERS;
+    uvec4 high = uvec4(corners[first], corners[first + 1u], corners[first + CORNERS], corners[first + CORNERS + 1u]);
+    uint all_inside = (low.x & low.y & low.z & low.w & high.x & high.y & high.z & high.w) & FIELD_HALF,
+         any_inside = (low.x | low.y | low.z | low.w | high.x | high.y | high.z | high.w) & FIELD_HALF;
+    bool here = all_inside != any_inside;
+    if (here) atomicOr(surface[k >> 5], 1u << (k & 31u));
+    if ((low.x & FIELD_HALF) != 0u) atomicOr(surface[2u + (k >> 5)], 1u << (k & 31u));
+    barrier();
+    if (k < 2u) records.at[record + FIELD_INSIDE + k] = surface[2u + k];
+    uvec2 bits = uvec2(surface[0], surface[1]);
+    if (k == 0u) {
+        uint count = field_before(bits, FIELD_NODES - 1u) + uint(field_bit(bits, FIELD_NODES - 1u));
+        first_cell = atomicAdd(counters.at[COUNTERS + CELLS], count); // its numbers follow from the count
+        // Without room for all there are none.
+        if (first_cell + count > build.cell_capacity) {
+            atomicAdd(counters.at[COUNTERS + CELLS_LEFT_OUT], count);
+            first_cell = build.cell_capacity;
+        } else {
+            uint local = home % FIELD_NODES;
+            atomicOr(table.at[slot + FIELD_SURFACE + (local >> 5)], 1u << (local & 31u));
+            records.at[record + FIELD_FIRST_CELL] = first_cell;
+            records.at[record + FIELD_CELLS] = bits.x;
+            records.at[record + FIELD_CELLS + 1u] = bits.y;
+        }
+    }
+    barrier();
+    if (!here || first_cell == build.cell_capacity) return;
+    uint cell = FIELD_CELL_RECORD * (first_cell + field_before(bits, k));
+    for (uint b = 0u; b < 4u; ++b) {
+        cells.at[cell + 2u * b] = bytes(low, b);
+        cells.at[cell + 2u * b + 1u] = bytes(high, b);
+    }
 }
 #endif

@@ -18,7 +18,6 @@ layout(constant_id = 4) const bool HOST_BACKGROUND = false; // only liquid is dr
 #ifndef EMPTY
 layout(push_constant) uniform PushBlock {
     uint slots;    // of the directory
-    float level;   // of the surface, in whole numbers of a node
     float ball;    // radius of a ball, in spacings
     float spacing; // of the nodes, in particle radii
 } push;
@@ -113,7 +112,7 @@ void meet(inout Walk w, Wall wall) {
         w.light *= 1.0 - reflected;
         w.dir = bent;
         w.within = entering ? wall.cls : AIR;
-        w.center = wall.center;
+        w.center = wall.place;
         if (entering) {
             ++w.volumes;
             if (w.volumes == 2u) w.second = wall.cls;
@@ -128,32 +127,33 @@ void meet(inout Walk w, Wall wall) {
 }
 
 // Whether liquid goes on behind a wall from within: then there is none.
-bool handed_over(inout Walk w) {
+bool handed_over(inout Walk w, inout Block block, Wall wall) {
+    uint ball = wall.ball;
     vec3 center;
-    if (w.within == CLASS_SPLASH && field_at(w.x) >= 0.0) {
-        w.within = CLASS_BODY;
-        return true;
-    }
-    if (ball_around(w.x, center)) {
+    // Behind a ball there may be the body.
+    bool body = false;
+    for (bool look = w.within == CLASS_SPLASH; look; look = false) body = in_field(block, w.x, ball);
+    bool other = !body && ball_around(w.x, ball, center);
+    if (body) w.within = CLASS_BODY;
+    if (other) {
         w.within = CLASS_SPLASH;
         w.center = center;
-        return true;
     }
-    return false;
+    return body || other;
 }
 
 // Goes on to the next wall, or to where the walk ends; eq. (9) on the way inside. True where there is nothing to meet: from
 // one volume into another.
-bool go_on(inout Walk w, out Wall wall) {
+bool go_on(inout Walk w, inout Block block, out Wall wall) {
     bool inside = w.within != AIR, stopped = false;
     vec2 box = within_box(w.x, w.dir);
     if (w.within == CLASS_SPLASH) {
         vec2 t;
         meets_ball(w.center, w.x, w.dir, t);
         t.y = max(t.y, 0.0);
-        wall = Wall(t.y, CLASS_SPLASH, w.center);
+        wall = Wall(t.y, CLASS_SPLASH, w.center, 0u, 0u);
     } else {
-        wall = find_wall(w.x, w.dir, inside, box.x, box.y, stopped);
+        wall = find_wall(block, w.x, w.dir, inside, box.x, box.y, stopped);
     }
     int found = stopped ? OUTCOME_NOT_CONVERGED : wall.t < NONE ? OUTCOME_HIT : inside ? OUTCOME_NO_WALL : OUTCOME_NO_LIQUID;
     float t = min(wall.t, max(box.y, 0.0));
@@ -175,7 +175,7 @@ bool go_on(inout Walk w, out Wall wall) {
     }
     if (inside || found == OUTCOME_HIT) w.x += t * w.dir;
     w.outcome = found;
-    return found == OUTCOME_HIT && inside && handed_over(w);
+    return found == OUTCOME_HIT && inside && handed_over(w, block, wall);
 }
 
 void main() {
@@ -188,18 +188,20 @@ void main() {
     float per_depth = 1.0 / (-eye_dir.z * push.spacing);
     vec2 range = vec2((uintBitsToFloat(bounds.x) - frame.near) * per_depth, (uintBitsToFloat(INFINITE - bounds.y) - frame.near) * per_depth);
     if (bounds.x == INFINITE) range = vec2(NONE, 0.0);
+    Block block = NOWHERE;
     // The near plane may lie in the liquid.
-    if (range.x <= 0.0 && range.y >= 0.0) {
-        if (field_at(w.x) >= 0.0) w.within = CLASS_BODY;
-        else if (ball_around(w.x, w.center)) w.within = CLASS_SPLASH;
+    for (bool look = range.x <= 0.0 && range.y >= 0.0; look; look = false) {
+        uint ball;
+        if (in_field(block, w.x, ball)) w.within = CLASS_BODY;
+        else if (ball_around(w.x, ball, w.center)) w.within = CLASS_SPLASH;
     }
     int first = w.within;
     bool straight = first != AIR, stopped = false;
-    Wall wall = Wall(0.0, CLASS_BODY, vec3(0.0));
+    Wall wall = Wall(0.0, CLASS_BODY, vec3(0.0), 0u, 0u);
     if (straight) {
         w.volumes = 1u;
     } else {
-        wall = find_wall(w.x, w.dir, false, max(range.x, 0.0), range.y + FIELD_NUDGE, stopped);
+        wall = find_wall(block, w.x, w.dir, false, max(range.x, 0.0), range.y + FIELD_NUDGE, stopped);
         first = wall.cls;
         w.x += wall.t * w.dir;
     }
@@ -214,7 +216,7 @@ void main() {
         if (!straight) meet(w, wall);
         done = REFRACTIONS == 1 || w.outcome != OUTCOME_HIT || (w.within == AIR && w.volumes == volumes);
         if (!done) {
-            straight = go_on(w, wall);
+            straight = go_on(w, block, wall);
             done = w.outcome != OUTCOME_HIT;
         }
     }

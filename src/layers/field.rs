@@ -13,8 +13,9 @@ use crate::{
     plan::{Call, Groups, Plan, Target},
     prepare::rest_density,
     shader::{
-        FIELD_FINISH_COMP, FIELD_LINK_COMP, FIELD_MARK_COMP, FIELD_MOST_BRICKS, FIELD_NODES, FIELD_NUMBER_COMP,
-        FIELD_ONE, FIELD_RECORD, FIELD_SCATTER_COMP, FieldBuild, FieldHead, PARTICLE_GROUP, SPLASH_RADIUS, Shader,
+        FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_MARK_COMP, FIELD_MOST_BRICKS,
+        FIELD_NODE_WORDS, FIELD_NODES, FIELD_NUMBER_COMP, FIELD_ONE, FIELD_RECORD, FIELD_SCATTER_COMP, FIELD_SLOT,
+        FieldBuild, FieldHead, PARTICLE_GROUP, SPLASH_RADIUS, Shader,
     },
     space::power_of_two,
 };
@@ -32,21 +33,28 @@ parameters! {
         level: f32 = 0.57, "", "0.05 to 0.95" => |l| (0.05..=0.95).contains(l);
         /// What there is room for in proportion to the particles, whose own volume is (2 r)³ each: bricks of 64 nodes. Bricks
         /// beyond it are left out, and counted
-        room: f32 = 6.0, "volumes of the particles", "1 to 1000" => |r| (1.0..=1000.0).contains(r);
+        room: f32 = 5.0, "volumes of the particles", "1 to 1000" => |r| (1.0..=1000.0).contains(r);
     }
 }
 
 /// Bricks that there is room for in any case, as far as so many particles can reach: 27 each.
 const LEAST_BRICKS: u64 = 4096;
 
-/// Points of which 32 bits can name 27 bricks each.
-pub(crate) const MOST_POINTS: u32 = (u32::MAX - 1) / 27;
+/// Cells that hold the surface in proportion to bricks: in real liquids 4 to 11, the more the fewer particles there are.
+const CELLS_PER_BRICK: u64 = 5;
+
+/// Such cells that there is room for in any case, as far as bricks have so many.
+const LEAST_CELLS: u64 = 65_536;
+
+/// Points of which 31 bits can name eight blocks each.
+pub(crate) const MOST_POINTS: u32 = FIELD_FAR / 8;
 
 /// Balls in bricks that there is room for in any case, as far as so many particles can reach: 8 bricks each.
 const LEAST_BALLS: u64 = 65_536;
 
 /// What its passes count.
-const COUNTED: [&str; 3] = ["field_bricks", "field_bricks_left_out", "field_balls_left_out"];
+const COUNTED: [&str; 5] =
+    ["field_bricks", "field_cells", "field_bricks_left_out", "field_cells_left_out", "field_balls_left_out"];
 
 /// A field as its readers find it.
 #[derive(Clone, Copy)]
@@ -54,7 +62,7 @@ pub(crate) struct Volume {
     pub head: Target,
     pub table: Target,
     pub records: Target,
-    pub nodes: Target,
+    pub cells: Target,
     pub balls: Target,
     pub build: FieldBuild,
     /// Distance of the nodes in particle radii.
@@ -78,13 +86,16 @@ impl Field {
         let edge = f64::from(4.0 * self.spacing);
         let bricks = (f64::from(self.room) * count as f64 * 8.0 / edge.powi(3)) as u64;
         let bricks = bricks.max(LEAST_BRICKS).min(27 * count).min(u64::from(FIELD_MOST_BRICKS - 1));
+        let cells = (CELLS_PER_BRICK * bricks).max(LEAST_CELLS).min(u64::from(FIELD_NODES) * bricks);
         let radius = scene.space.radius as f32;
         let unit = power_of_two(radius);
         let origin = scene.space.origin.as_vec3() * unit;
         FieldBuild {
             count: scene.count,
             capacity: bricks as u32 + 1,
-            slots: (3 * bricks).next_power_of_two().clamp(64, 1 << 26) as u32,
+            // Balls, which are the least that there is, reach into 1.3 blocks each, and 2.2 bricks.
+            slots: (3 * bricks / 4).next_power_of_two().max(64) as u32,
+            cell_capacity: cells as u32,
             ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count) as u32,
             spacing: self.spacing * (radius * unit),
             reach: self.kernel_radius / self.spacing,
@@ -102,23 +113,26 @@ impl Field {
         let build = self.build(scene);
         let words = |n: u32| 4 * u64::from(n);
         let head = plan.buffer("field head", size_of::<FieldHead>() as u64);
-        let table = plan.array("field directory", words(build.slots));
+        let table = plan.array("field directory", words(FIELD_SLOT) * (u64::from(build.slots) + 1));
         let records = plan.array("field bricks", words(FIELD_RECORD) * u64::from(build.capacity));
-        let nodes = plan.array("field nodes", words(FIELD_NODES) * u64::from(build.capacity));
-        let balls = plan.array("field balls", 16 * u64::from(build.ball_capacity));
+        let nodes = plan.array("field nodes", words(FIELD_NODE_WORDS) * u64::from(build.capacity));
+        let cells = plan.array("field cells", words(FIELD_CELL_RECORD) * u64::from(build.cell_capacity));
+        let balls = plan.array("field balls", words(FIELD_BALL) * u64::from(build.ball_capacity));
         for zeros in [head, table, records, nodes] {
             plan.fill("field", zeros, 0, vk::WHOLE_SIZE, 0);
         }
         let call = |shader: &'static Shader| Call::compute(shader).update("table", table).push_all(&build);
-        let mark = call(&FIELD_MARK_COMP).read("points", points.points).counting(&COUNTED);
+        // Where the host prepared the points, the shaders do not look; something has to be bound all the same.
+        let from_origin = |call: Call| {
+            let extent = points.extent.unwrap_or(points.points);
+            call.read("extent", extent).constant("ORIGIN_ON_DEVICE", points.extent.is_some())
+        };
+        let mark = from_origin(call(&FIELD_MARK_COMP)).read("points", points.points).counting(&COUNTED);
         plan.dispatch("field", mark, per_particle(build.count));
-        let number = call(&FIELD_NUMBER_COMP)
+        let number = from_origin(call(&FIELD_NUMBER_COMP))
             .update("head", head)
             .read("points", points.points)
             .update("records", records)
-            // Where the host prepared the points, the shader does not look; something has to be bound all the same.
-            .read("extent", points.extent.unwrap_or(points.points))
-            .constant("ORIGIN_ON_DEVICE", points.extent.is_some())
             .counting(&COUNTED);
         plan.dispatch("field", number, per_particle(build.slots));
         let scatter = call(&FIELD_SCATTER_COMP)
@@ -127,14 +141,17 @@ impl Field {
             .update("records", records)
             .update("nodes", nodes)
             .write("balls", balls)
+            .constant("ACROSS", (2.0 * build.reach).ceil() as u32)
             .counting(&COUNTED);
         plan.dispatch("field", scatter, per_particle(build.count));
-        let a_brick_each = Groups::Indirect(head, 0);
-        let link = call(&FIELD_LINK_COMP).read("head", head).update("records", records);
-        plan.dispatch("field", link, a_brick_each);
-        let finish = call(&FIELD_FINISH_COMP).read("head", head).update("records", records).read("nodes", nodes);
-        plan.dispatch("field", finish, a_brick_each);
-        Volume { head, table, records, nodes, balls, build, spacing: self.spacing }
+        let finish = call(&FIELD_FINISH_COMP)
+            .read("head", head)
+            .update("records", records)
+            .read("nodes", nodes)
+            .write("cells", cells)
+            .counting(&COUNTED);
+        plan.dispatch("field", finish, Groups::Indirect(head, 0));
+        Volume { head, table, records, cells, balls, build, spacing: self.spacing }
     }
 }
 

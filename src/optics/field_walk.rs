@@ -26,10 +26,17 @@ pub(super) fn draws(
         .read("head", field.head)
         .read("table", field.table)
         .read("records", field.records)
+        .read("balls", field.balls)
         .update("tiles", tiles)
         .push("capacity", field.build.capacity)
-        .push("spacing", field.spacing);
+        .push("spacing", field.spacing)
+        .push("ball", field.build.ball);
     plan.dispatch("field tiles", bounds, Groups::Indirect(field.head, 0));
+    let read = [field.table, field.records, field.cells];
+    // As texels too, where the device has so large texel buffers.
+    let texels = read.iter().all(|buffer| plan.bytes(*buffer).is_some_and(|bytes| bytes <= scene.texels_size));
+    let no_texels = (!texels).then(|| plan.buffer("no texels", 16));
+    let as_texels = |buffer| no_texels.unwrap_or(buffer);
     let draw = |plan: &mut Plan, empty: bool| {
         let fragment = &FIELD_WALK_FRAG[variant(scene) + 8 * usize::from(empty)];
         let call = Call::draw(&FIELD_TILES_VERT[usize::from(!points)], fragment)
@@ -41,12 +48,15 @@ pub(super) fn draws(
             false => call
                 .read("head", field.head)
                 .read("table", field.table)
+                .read("table_texels", as_texels(field.table))
                 .read("records", field.records)
-                .read("nodes", field.nodes)
+                .read("record_texels", as_texels(field.records))
+                .read("cells", field.cells)
+                .read("cell_texels", as_texels(field.cells))
                 .read("balls", field.balls)
                 .read("tiles", tiles)
+                .constant("TEXELS", texels)
                 .push("slots", field.build.slots)
-                .push("level", field.build.level as f32)
                 .push("ball", field.build.ball)
                 .push("spacing", field.spacing),
         };

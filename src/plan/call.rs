@@ -281,16 +281,21 @@ impl Call {
         let (image, storage) = match b.kind {
             Kind::SampledImage(_) => (true, false),
             Kind::StorageImage(..) => (true, true),
+            Kind::TexelBuffer => (false, false),
             _ => (false, true),
         };
         if let [vertex, _] = self.recipe.shaders.as_slice() {
             return match (touch, vertex.bindings.contains(b), image && storage) {
                 (Touch::Read, true, false) => Ok(Access::VertexRead),
                 (Touch::Read, true, true) => Err(format!("{} is an image that a vertex shader reads", b.name)),
+                (Touch::Read, false, false) if b.kind == Kind::TexelBuffer => Ok(Access::FragmentTexelRead),
                 (Touch::Read, false, false) => Ok(Access::FragmentRead),
                 (Touch::Read, false, true) => Ok(Access::FragmentStorageRead),
                 _ => Err(format!("{} is written while drawing", b.name)),
             };
+        }
+        if b.kind == Kind::TexelBuffer {
+            return Err(format!("{} is a texel buffer, and not a fragment shader's", b.name));
         }
         if image && (touch == Touch::Read) == storage {
             return Err(format!("{} is {:?}: sampled images are read, storage images written", b.name, b.kind));
@@ -326,7 +331,7 @@ fn fits(plan: &Plan, b: &Binding, target: Target) -> Result<(), String> {
         (Some(texels), Made::Given(External::SceneColor | External::SceneDepth)) => !texels.uint && !texels.cube,
         (Some(texels), Made::Given(External::Environment)) => !texels.uint,
         (None, Made::Own(Spec::Buffer { .. })) => true,
-        (None, Made::Given(given)) => {
+        (None, Made::Given(given)) if b.kind != Kind::TexelBuffer => {
             use External::{Centers, Diagonals, FrameBlock, Ids, Mixed, Points, Positions, Speeds};
             matches!(given, FrameBlock(_) | Positions | Ids | Centers | Diagonals | Mixed | Speeds | Points)
         }

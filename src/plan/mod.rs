@@ -155,6 +155,14 @@ impl Plan {
         self.resources.iter().position(|r| r.name == name).map(Target)
     }
 
+    /// Bytes of a buffer of the frame's own.
+    pub fn bytes(&self, target: Target) -> Option<u64> {
+        match self.resource(target).made {
+            Made::Own(Spec::Buffer { bytes, .. }) => Some(bytes),
+            _ => None,
+        }
+    }
+
     /// How an image of the frame's own is made.
     fn image_spec(&self, target: Target) -> Option<&ImageSpec> {
         match &self.resource(target).made {

@@ -211,6 +211,7 @@ fn every_method_has_a_plan() {
         timestamp_period: None,
         timestamp_mask: 0,
         storage_size: 1 << 30,
+        texels_size: 1 << 20,
         memory: 1 << 32,
     };
     let (mut planned, mut refused) = (0, 0);

@@ -10,15 +10,15 @@ use super::{
 };
 use crate::{
     Equirect, Fresnel,
-    layers::field::twin::{Brick, Place, node_of, whole},
+    layers::field::twin::{Brick, Corner, Place, corner_of, whole},
     optics::walk::Walk as Rays,
     shader::{
-        BOX_MARGIN, CLASS_BODY, CLASS_SPLASH, FIELD_BRICK, FIELD_NUDGE, FIELD_ONE, OUTCOME_HIT, OUTCOME_NO_LIQUID,
+        BOX_MARGIN, CLASS_BODY, CLASS_SPLASH, FIELD_BRICK, FIELD_HALF, FIELD_NUDGE, OUTCOME_HIT, OUTCOME_NO_LIQUID,
         OUTCOME_NO_WALL, OUTCOME_REFLECTION_LIMIT, OUTCOME_SCENE, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH,
         SPLASH_RADIUS, WETTING_FLAT, WETTING_GAP,
     },
 };
-use glam::{DVec3, IVec3, Mat3, Vec3, Vec4Swizzles};
+use glam::{DVec3, I8Vec3, IVec3, Mat3, Vec3, Vec4Swizzles};
 use std::collections::BTreeMap;
 
 /// The field as the device has built it, and how it lies in the liquid's own space. Lengths below are spacings of its nodes,
@@ -51,9 +51,8 @@ impl<'a> Field<'a> {
         Field { bricks, base, part, spacing, level, balls: balls.collect() }
     }
 
-    fn node(&self, node: IVec3) -> f64 {
-        let [x, y, z] = (node + IVec3::from(self.base)).to_array();
-        f64::from(node_of(self.bricks, [x, y, z])) / f64::from(FIELD_ONE)
+    fn node(&self, node: IVec3) -> Corner {
+        corner_of(self.bricks, whole(self.level), (node + IVec3::from(self.base)).to_array())
     }
 
     /// Trilinear between nodes of which each has some value.
@@ -68,16 +67,14 @@ impl<'a> Field<'a> {
         all.sum()
     }
 
-    /// The field less its level.
+    /// The field less its level, in 1/256 of twice the level: in the middle of what a byte stands for.
     pub fn at(&self, x: DVec3) -> f64 {
-        let whole_level = whole(self.level).round() / f64::from(FIELD_ONE);
-        self.between(x, |node| DVec3::splat(self.node(node))).x - whole_level
+        self.between(x, |node| DVec3::splat(f64::from(self.node(node).0) + 0.5 - f64::from(FIELD_HALF))).x
     }
 
-    /// Its gradient: central differences at nodes, between which they are trilinear.
+    /// Its gradient, in no unit: trilinear between what nodes hold.
     pub fn gradient(&self, x: DVec3) -> DVec3 {
-        let slope = |node: IVec3, axis: IVec3| 0.5 * (self.node(node + axis) - self.node(node - axis));
-        self.between(x, |node| DVec3::new(slope(node, IVec3::X), slope(node, IVec3::Y), slope(node, IVec3::Z)))
+        self.between(x, |node| I8Vec3::from(self.node(node).1).as_dvec3())
     }
 
     fn ball_radius(&self) -> f64 {

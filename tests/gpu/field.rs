@@ -11,11 +11,11 @@ use meniscus::{
         Layers,
         field::{
             Field,
-            twin::{Brick, Lattice, Place, Words, node_of, whole},
+            twin::{Brick, Corner, Lattice, Place, Words, corner, node_of, whole},
         },
     },
     prepare::{Input, Options, Search, points, prepare},
-    shader::{FIELD_BALLS, FIELD_INSIDE, FIELD_ONE, FIELD_SURFACE},
+    shader::{FIELD_CELL_RECORD, FIELD_ONE},
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -59,18 +59,19 @@ pub fn words(shot: &Shot) -> Words<'_> {
         directory: of("field directory"),
         records: of("field bricks"),
         nodes: of("field nodes"),
+        cells: of("field cells"),
         balls: of("field balls"),
     }
 }
 
-/// Flags, nodes, cells and balls of a brick.
-type Content = (u32, Vec<u32>, u64, BTreeSet<[u32; 3]>);
+/// Nodes, cells, their corners and balls of a brick.
+type Content = (Vec<u32>, u64, Vec<[Corner; 8]>, BTreeSet<[u32; 3]>);
 
 /// What of a field does not hang on how its bricks are numbered.
 fn content(shot: &Shot) -> BTreeMap<Place, Content> {
     let bricks = words(shot).bricks();
     let balls = |b: &Brick| b.balls.iter().map(|c| c.map(f32::to_bits)).collect();
-    bricks.iter().map(|(place, b)| (*place, (b.flags, b.nodes.clone(), b.cells, balls(b)))).collect()
+    bricks.iter().map(|(place, b)| (*place, (b.nodes.clone(), b.cells, b.corners.clone(), balls(b)))).collect()
 }
 
 fn block(n: [i32; 3], radius: f32, origin: Vec3, jitter: f32) -> Vec<Vec3> {
@@ -116,49 +117,59 @@ fn check(shot: &Shot, points: &[Vec4], lattice: &Lattice, label: &str) {
     let odd = bricks.keys().find(|b| !most.contains(*b));
     assert!(odd.is_none(), "{label}: {odd:?} is out of reach");
     assert_eq!(shot.counter("field_bricks") as usize, bricks.len(), "{label}");
-    assert_eq!([shot.counter("field_bricks_left_out"), shot.counter("field_balls_left_out")], [0, 0], "{label}");
+    let left_out = ["field_bricks_left_out", "field_cells_left_out", "field_balls_left_out"];
+    assert_eq!(left_out.map(|name| shot.counter(name)), [0; 3], "{label}");
 
     // The field at each node.
     let wanted = lattice.nodes(points);
     let (mut worst, mut inside) = (0f64, 0);
+    let one = f64::from(FIELD_ONE);
     for (place, brick) in &bricks {
         for (k, found) in brick.nodes.iter().enumerate() {
             let node = [0, 1, 2].map(|axis| 4 * place[axis] + (k >> (2 * axis) & 3) as i32);
             let (sum, count) = wanted.get(&node).copied().unwrap_or_default();
-            let off = (f64::from(*found) - whole(sum)).abs() / (0.7 * f64::from(count) + 3e-6 * whole(sum) + 1.0);
-            assert!(off <= 1.0, "{label}: node {node:?} of {count} points holds {found} instead of {}", whole(sum));
+            let sum = one * sum;
+            let off = (f64::from(*found) - sum).abs() / (0.7 * f64::from(count) + 3e-6 * sum + 1.0);
+            assert!(off <= 1.0, "{label}: node {node:?} of {count} points holds {found} instead of {sum}");
             worst = worst.max(off);
-            inside += usize::from(whole(sum) >= whole(lattice.level));
+            inside += usize::from(sum >= one * lattice.level);
         }
     }
-    let lost = wanted.iter().find(|(node, (sum, _))| whole(*sum) > 1.0 && node_of(&bricks, **node) == 0);
+    let lost = wanted
+        .iter()
+        .find(|(node, (sum, count))| one * sum > 0.7 * f64::from(*count) + 1.0 && node_of(&bricks, **node) == 0);
     assert!(lost.is_none(), "{label}: {lost:?}");
 
     // What follows from the nodes.
-    let level = whole(lattice.level).round() as u32;
+    let level = whole(lattice.level);
+    let at = |node: Place| node_of(&bricks, node);
     let mut surface = 0;
     for (place, brick) in &bricks {
         let label = format!("{label}: brick {place:?}");
-        let mut cells = 0u64;
-        let mut any_inside = false;
+        let (mut cells, mut inside) = (0u64, 0u64);
         for k in 0..64 {
-            let corners = (0..8).filter(|c| {
-                let at = |axis: usize| 4 * place[axis] + (k >> (2 * axis) & 3) + (c >> axis & 1);
-                node_of(&bricks, [at(0), at(1), at(2)]) >= level
-            });
-            let corners = corners.count();
-            any_inside |= corners > 0;
-            cells |= u64::from(corners > 0 && corners < 8) << k;
+            let first = [0, 1, 2].map(|axis| 4 * place[axis] + (k >> (2 * axis) & 3));
+            let corners = (0..8).map(|c| [0, 1, 2].map(|axis| first[axis] + (c >> axis & 1)));
+            let within = corners.clone().filter(|c| at(*c) >= level).count();
+            inside |= u64::from(at(first) >= level) << k;
+            if within == 0 || within == 8 {
+                continue;
+            }
+            // What a walk finds in it; where rounding decides, both are right.
+            let found = brick.corners.get(cells.count_ones() as usize).expect("corners of each cell");
+            for (c, (held, slope)) in corners.zip(found) {
+                let beside = |by: i32| [0, 1, 2].map(|axis| at([0, 1, 2].map(|a| c[a] + by * i32::from(a == axis))));
+                let wanted = corner(level, at(c), [beside(-1), beside(1)]);
+                let near = (0..3).all(|axis| slope[axis].abs_diff(wanted.1[axis]) <= 1);
+                assert!(*held == wanted.0 && near, "{label}: {held} {slope:?} at {c:?} instead of {wanted:?}");
+            }
+            cells |= 1 << k;
         }
-        assert_eq!(brick.cells, cells, "{label}: cells");
-        assert_eq!([brick.has(FIELD_SURFACE), brick.has(FIELD_INSIDE)], [cells != 0, any_inside], "{label}: flags");
-        assert_eq!(brick.has(FIELD_BALLS), !brick.balls.is_empty(), "{label}: flag of balls");
+        assert_eq!([brick.cells, brick.inside], [cells, inside], "{label}: cells and nodes inside");
+        assert_eq!(brick.surface, cells != 0, "{label}: flag of the surface");
+        assert_eq!(brick.has_balls, !brick.balls.is_empty(), "{label}: flag of balls");
         surface += cells.count_ones();
-        for (k, number) in brick.neighbours.iter().enumerate() {
-            let next = [0, 1, 2].map(|axis| place[axis] + (k >> axis & 1) as i32);
-            assert_eq!(*number, bricks.get(&next).map_or(0, |b| b.number), "{label}: neighbour {k}");
-            assert_eq!(words.find(next), *number, "{label}: look-up of {next:?}");
-        }
+        assert_eq!(words.find(*place), brick.number, "{label}: look-up");
         assert_eq!(words.find(place.map(|c| c - 1_000_000)), 0, "{label}: look-up of what is not there");
     }
 
@@ -169,7 +180,10 @@ fn check(shot: &Shot, points: &[Vec4], lattice: &Lattice, label: &str) {
         let x = point.truncate().as_dvec3() / lattice.spacing;
         let in_brick = |place: &Place| {
             let corner = 4.0 * glam::IVec3::from(*place).as_dvec3();
-            let near = |c: &&[f32; 3]| (corner + Vec3::from(**c).as_dvec3()).distance(x) < 1e-3 + 1e-6 * x.length();
+            // Within half a step on each axis.
+            let near = |c: &&[f32; 3]| {
+                (corner + Vec3::from(**c).as_dvec3() - x).abs().max_element() < 0.5 / 128.0 + 1e-6 * (1.0 + x.length())
+            };
             bricks.get(place).is_some_and(|b| b.balls.iter().any(|c| near(&c)))
         };
         assert!(sure.iter().all(in_brick), "{label}: a ball at {point} is missing");
@@ -224,7 +238,7 @@ fn order_and_view_do_not_show() {
     each_driver(|driver| {
         let (shot, _) = shoot(driver, &positions, &case);
         let first = content(&shot);
-        assert!(first.values().any(|b| b.0 & FIELD_SURFACE != 0 && b.3.len() > 1), "{}", driver.name);
+        assert!(first.values().any(|b| b.1 != 0 && b.3.len() > 1), "{}", driver.name);
         for (what, positions, case) in
             [("shuffled", &shuffled, &case), ("seen from elsewhere", &positions, &moved), ("again", &positions, &case)]
         {
@@ -288,12 +302,36 @@ fn what_there_is_no_room_for_is_counted() {
         let shot = driver.shoot_cloud_unlisted(&case, &cloud);
         let [there, missing] = ["field_bricks", "field_bricks_left_out"].map(|name| shot.counter(name));
         println!("{}: {there} bricks, {missing} left out", driver.name);
-        assert_eq!(there, 4096, "{}", driver.name);
+        // Whole blocks are left out.
+        assert!((4096 - 63..=4096).contains(&there), "{}", driver.name);
         let all = Lattice::new(&Field::default(), 0.1).bricks(&made(&shot), 0.0).len();
         assert!((there + missing).abs_diff(all as u32) <= all as u32 / 100, "{}: {missing} of {all}", driver.name);
         assert!(shot.picture.as_flattened().iter().all(|v| v.is_finite()), "{}", driver.name);
         let (nothing, _) = shoot(driver, &[], &case);
         assert!(nothing.words("field nodes", 0).is_none(), "{}", driver.name);
+    });
+}
+
+/// The same of cells that hold the surface: many more of them than liquids have, in crumbs.
+#[test]
+fn cells_without_room_are_counted() {
+    let crumb = block([2, 2, 2], 0.1, Vec3::ZERO, 0.0);
+    let places = block([16, 16, 16], 0.6, Vec3::ZERO, 0.0);
+    let positions: Vec<Vec3> = places.iter().flat_map(|p| crumb.iter().map(move |x| *p + *x)).collect();
+    let case = Case { settings: settings(Field::default().room(34.0), "four"), ..empty(0.1) };
+    each_driver(|driver| {
+        let options = Options::default().splash_threshold(0.0);
+        let cloud = Cloud { options, ..Cloud::new(&positions, Search::Runs) };
+        let shot = driver.shoot_cloud_unlisted(&case, &cloud);
+        let names = ["field_cells", "field_cells_left_out", "field_bricks_left_out"];
+        let [all, missing, bricks_missing] = names.map(|name| shot.counter(name));
+        let bricks = words(&shot).bricks();
+        let there: u32 = bricks.values().map(|b| b.cells.count_ones()).sum();
+        println!("{}: {all} cells, {missing} left out, {} bricks", driver.name, bricks.len());
+        assert!(missing > 0 && bricks_missing == 0 && there + missing == all, "{}: {there} there", driver.name);
+        let room = shot.words("field cells", 0).expect("cells").len() as u32 / FIELD_CELL_RECORD;
+        assert!(there <= room && room - there < 64, "{}: room for {room}, {there} there", driver.name);
+        assert!(shot.picture.as_flattened().iter().all(|v| v.is_finite()), "{}", driver.name);
     });
 }
 
@@ -321,7 +359,7 @@ fn points_are_asked_for() {
 /// A field that the device cannot bind is refused before anything is made for it, by what it would take.
 #[test]
 fn a_field_larger_than_the_device_binds_is_refused() {
-    let positions = block([40, 32, 32], 0.1, Vec3::ZERO, 0.0);
+    let positions = block([80, 32, 32], 0.1, Vec3::ZERO, 0.0);
     let ball = |center: &Vec3| crate::support::sphere(*center, 0.1);
     let particles = Particles { radius: 0.1, ellipsoids: positions.iter().map(ball).collect(), splash_count: 0 };
     let points: Vec<_> = positions.iter().map(|p| Point { position: *p, density: 1.0, class: Class::Body }).collect();

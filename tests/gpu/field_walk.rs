@@ -92,7 +92,8 @@ fn walk_in(
     // Where the liquid's own space begins, on the lattice.
     let unit = lattice.ball / (1.24 * f64::from(case.particles.radius));
     let origin = shot.space.origin * unit / lattice.spacing;
-    let base = origin.floor().as_ivec3();
+    // Places count from the first node of the block there.
+    let base = 16 * (origin / 16.0).floor().as_ivec3();
     let field =
         Twin::new(bricks, base.to_array(), origin - base.as_dvec3(), f64::from(own.spacing), f64::from(own.level));
     let none = Map { depth: &[], normal: &[] };

@@ -9,7 +9,7 @@ use meniscus::{
         Layers,
         field::twin::{Lattice, Words},
     },
-    shader::FIELD_ONE,
+    shader::{FIELD_ONE, FIELD_SLOT},
 };
 use serde_json::{Value, json};
 use std::error::Error;
@@ -22,16 +22,22 @@ pub fn write(job: &Job, session: &mut Session, mut write: impl FnMut(&str, Vec<u
     let Layers::Field(field) = job.settings.method.layers else { return Ok(()) };
     let Some(directory) = session.words("field directory", 0)? else { return Ok(()) };
     let mut words = |name| session.words(name, 0).map(Option::unwrap_or_default);
-    let (records, nodes, balls) = (words("field bricks")?, words("field nodes")?, words("field balls")?);
-    let all = Words { directory: &directory, records: &records, nodes: &nodes, balls: &balls };
+    let (records, nodes) = (words("field bricks")?, words("field nodes")?);
+    let (cells, balls) = (words("field cells")?, words("field balls")?);
+    let all = Words { directory: &directory, records: &records, nodes: &nodes, cells: &cells, balls: &balls };
     let bricks = all.bricks();
     let n = bricks.len() as u64;
-    write("field_directory.npy", npy(&[directory.len() as u64], directory.iter().copied())?)?;
+    let slots = directory.len() as u64 / u64::from(FIELD_SLOT);
+    write("field_directory.npy", npy(&[slots, u64::from(FIELD_SLOT)], directory.iter().copied())?)?;
     write("field_bricks.npy", npy(&[n, 3], bricks.keys().flatten().copied())?)?;
     write("field_numbers.npy", npy(&[n], bricks.values().map(|b| b.number))?)?;
-    write("field_flags.npy", npy(&[n], bricks.values().map(|b| b.flags as u8))?)?;
+    write("field_flags.npy", npy(&[n], bricks.values().map(|b| u8::from(b.surface) | u8::from(b.has_balls) << 1))?)?;
     write("field_cells.npy", npy(&[n], bricks.values().map(|b| b.cells))?)?;
     let values = bricks.values().flat_map(|b| b.nodes.iter().map(|v| f64::from(*v) / f64::from(FIELD_ONE)));
+    let corners: Vec<_> = bricks.values().flat_map(|b| b.corners.as_flattened()).collect();
+    let cells = corners.len() as u64 / 8;
+    write("field_held.npy", npy(&[cells, 2, 2, 2], corners.iter().map(|c| c.0))?)?;
+    write("field_gradients.npy", npy(&[cells, 2, 2, 2, 3], corners.iter().flat_map(|c| c.1))?)?;
     write("field_nodes.npy", npy(&[n, 4, 4, 4], values)?)?;
     // Balls reach into several bricks.
     let lattice = Lattice::new(&field, radius);
@@ -67,8 +73,9 @@ fn about(spacing: f64, lattice: &Lattice, job: &Job) -> Value {
         "level": lattice.level,
         "ball_radius": lattice.ball / lattice.spacing * spacing,
         "nodes": "node (i, j, k) lies at origin + (i, j, k) spacing; brick (x, y, z) has those from 4 (x, y, z) on; field_nodes: brick, z, y, x",
-        "flags": "1: some cells hold the surface (field_cells, bit x + 4 y + 16 z); 2: some nodes of its cells are inside; 4: balls reach into it",
-        "directory": "one word a slot, 0 free: the number of a brick (field_numbers) in bits 0 to 23, 0 left out; flags from bit 24, part of the hash from 27",
+        "flags": "1: some cells hold the surface (field_cells, bit x + 4 y + 16 z); 2: balls reach into it",
+        "held": "of each cell that holds the surface, in the order of bricks and bits, a byte at its corners z, y, x: the density times 128 / level, rounded down, 255 at most; field_gradients: z, y, x, axis, central differences times spacing times 127 / 0.75, scaled to 127 at most",
+        "directory": "a block of 4 x 4 x 4 bricks a slot, the last slot empty: its key, 0 where the slot is free; the number of its first brick (field_numbers), after which its others follow; bits of its bricks, x + 4 y + 16 z, two words each: those that there are, that hold the surface, into which balls reach; its place, by which brick coordinates are 4 times that",
         "points": "x, y, z, number density as a part of a filled body's, negative for balls, 0 where nothing is",
         "field": "sum over points of positive density r of W(distance / support) / (filled_weights max(min(r, 1.2), r / 64)), W the cubic spline, 1 at 0",
     })

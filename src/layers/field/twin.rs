@@ -4,9 +4,10 @@ use super::Field;
 use crate::{
     prepare::density::{rest_density, spline},
     shader::{
-        FIELD_BALLS, FIELD_BRICK, FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_FIRST_BALL, FIELD_FLAGS, FIELD_INSIDE,
-        FIELD_MOST_BRICKS, FIELD_NODES, FIELD_ONE, FIELD_PLACE, FIELD_PROBES, FIELD_RECORD, FIELD_SURFACE, FIELD_TAG,
-        SPLASH_RADIUS,
+        FIELD_BALL, FIELD_BALL_BELOW, FIELD_BALL_BITS, FIELD_BALL_STEPS, FIELD_BALLS, FIELD_BRICK, FIELD_CELL_RECORD,
+        FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_FIRST_BALL, FIELD_FIRST_BRICK, FIELD_FIRST_CELL, FIELD_HALF,
+        FIELD_INSIDE, FIELD_NODE_WORDS, FIELD_NODES, FIELD_ONE, FIELD_PLACE, FIELD_PROBES, FIELD_RECORD, FIELD_SLOT,
+        FIELD_STEEPEST, FIELD_SURFACE, FIELD_THERE, SPLASH_RADIUS,
     },
     space::power_of_two,
 };
@@ -103,28 +104,38 @@ fn places(low: IVec3, high: IVec3) -> impl Iterator<Item = Place> {
     (low.x..=high.x).flat_map(plane)
 }
 
+/// A node as a walk finds it: the field in a byte, and its gradient.
+pub type Corner = (u8, [i8; 3]);
+
+/// What a walk finds at a node, from the sum that it holds and those before and behind it on each axis.
+pub fn corner(level: u32, sum: u32, [before, behind]: [[u32; 3]; 2]) -> Corner {
+    let held = u64::from(sum) * u64::from(FIELD_HALF) / u64::from(level);
+    let unit = 2.0 * FIELD_STEEPEST as f64 * f64::from(FIELD_ONE);
+    let slope = [0, 1, 2].map(|axis| (f64::from(behind[axis]) - f64::from(before[axis])) / unit);
+    // What is steeper keeps its direction.
+    let steepest = slope.iter().fold(1f64, |most, s| most.max(s.abs()));
+    (held.min(255) as u8, slope.map(|s| (127.0 * s / steepest).round() as i8))
+}
+
 /// A brick as the device has built it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Brick {
     /// Where its nodes are among all.
     pub number: u32,
-    /// Some of its cells hold the surface; some of its cells' nodes are inside; balls reach into it.
-    pub flags: u32,
+    /// Some of its cells hold the surface.
+    pub surface: bool,
+    /// Balls reach into it.
+    pub has_balls: bool,
     /// The field at its nodes times [`FIELD_ONE`], x before y before z.
     pub nodes: Vec<u32>,
+    /// One bit for each node that is inside.
+    pub inside: u64,
     /// One bit for each cell that holds the surface.
     pub cells: u64,
-    /// Numbers of the bricks next to it, by which coordinates are larger there; its own first.
-    pub neighbours: [u32; 8],
+    /// Of each of these, in the order of the bits, what its corners hold, x before y before z.
+    pub corners: Vec<[Corner; 8]>,
     /// Centres of its balls, in spacings from its first node on, in no order.
     pub balls: Vec<[f32; 3]>,
-}
-
-impl Brick {
-    /// Whether there is this in it: [`FIELD_SURFACE`], [`FIELD_INSIDE`] or [`FIELD_BALLS`].
-    pub fn has(&self, flag: u32) -> bool {
-        self.flags & flag != 0
-    }
 }
 
 /// The field as the device has built it, from its buffers' words.
@@ -136,58 +147,104 @@ pub struct Words<'a> {
     pub records: &'a [u32],
     /// "field nodes"
     pub nodes: &'a [u32],
+    /// "field cells"
+    pub cells: &'a [u32],
     /// "field balls"
     pub balls: &'a [u32],
 }
 
 impl Words<'_> {
-    fn record(&self, number: u32) -> &[u32] {
-        &self.records[(FIELD_RECORD * number) as usize..][..FIELD_RECORD as usize]
+    fn slot(&self, slot: usize) -> &[u32] {
+        &self.directory[FIELD_SLOT as usize * slot..][..FIELD_SLOT as usize]
     }
 
-    fn place(&self, number: u32) -> Place {
-        let at = FIELD_PLACE as usize;
-        [0, 1, 2].map(|axis| self.record(number)[at + axis] as i32)
+    /// Those that blocks can have; one more follows them, which has nothing in it.
+    fn slots(&self) -> usize {
+        self.directory.len() / FIELD_SLOT as usize - 1
+    }
+
+    fn bits(&self, slot: usize, which: u32) -> u64 {
+        bits(&self.slot(slot)[which as usize..])
+    }
+
+    fn place(&self, slot: usize) -> IVec3 {
+        let place = &self.slot(slot)[FIELD_PLACE as usize..];
+        IVec3::new(place[0] as i32, place[1] as i32, place[2] as i32)
+    }
+
+    /// The number of the k-th brick of a slot's block, if it has that.
+    fn number(&self, slot: usize, k: u32) -> Option<u32> {
+        let there = self.bits(slot, FIELD_THERE);
+        let before = (there & ((1 << k) - 1)).count_ones();
+        (there >> k & 1 == 1).then(|| self.slot(slot)[FIELD_FIRST_BRICK as usize] + before)
     }
 
     /// All bricks that there is room for.
     pub fn bricks(&self) -> BTreeMap<Place, Brick> {
-        let taken = self.directory.iter().filter(|word| **word & FIELD_MOST_BRICKS != 0);
-        taken.map(|word| (self.place(*word & FIELD_MOST_BRICKS), self.brick(*word))).collect()
+        let all = (0..self.slots()).flat_map(|slot| (0..FIELD_NODES).map(move |k| (slot, k)));
+        let brick = |(slot, k): (usize, u32)| {
+            let number = self.number(slot, k)?;
+            let local = IVec3::new(k as i32 & 3, k as i32 >> 2 & 3, k as i32 >> 4);
+            let place = FIELD_BRICK as i32 * self.place(slot) + local;
+            Some((place.to_array(), self.brick(slot, k, number)))
+        };
+        all.filter_map(brick).collect()
     }
 
-    fn brick(&self, word: u32) -> Brick {
-        let number = word & FIELD_MOST_BRICKS;
-        let record = self.record(number);
-        let [low, high] = [FIELD_CELLS, FIELD_CELLS + 1].map(|at| u64::from(record[at as usize]));
-        let mut neighbours = [number; 8];
-        neighbours[1..].copy_from_slice(&record[1..8]);
+    fn brick(&self, slot: usize, k: u32, number: u32) -> Brick {
+        let record = &self.records[(FIELD_RECORD * number) as usize..][..FIELD_RECORD as usize];
+        let cells = bits(&record[FIELD_CELLS as usize..]);
+        let first = record[FIELD_FIRST_CELL as usize];
+        let corners = (first..first + cells.count_ones()).map(|cell| self.corners(cell)).collect();
         let mut balls = Vec::new();
         let mut next = record[FIELD_FIRST_BALL as usize];
         while next != 0 {
-            let ball = &self.balls[4 * (next - 1) as usize..][..4];
-            balls.push([ball[0], ball[1], ball[2]].map(f32::from_bits));
-            next = ball[3];
+            let ball = &self.balls[(FIELD_BALL * (next - 1)) as usize..][..FIELD_BALL as usize];
+            let steps = [0, 1, 2].map(|axis| ball[0] >> (FIELD_BALL_BITS * axis) & ((1 << FIELD_BALL_BITS) - 1));
+            balls.push(steps.map(|s| s as f32 / FIELD_BALL_STEPS as f32 - FIELD_BALL_BELOW as f32));
+            next = ball[1];
         }
-        let nodes = self.nodes[(FIELD_NODES * number) as usize..][..FIELD_NODES as usize].to_vec();
-        let flags = word >> FIELD_FLAGS & (FIELD_SURFACE | FIELD_INSIDE | FIELD_BALLS);
-        Brick { number, flags, nodes, cells: low | high << 32, neighbours, balls }
+        let words = &self.nodes[(FIELD_NODE_WORDS * number) as usize..][..FIELD_NODE_WORDS as usize];
+        let nodes = words.iter().flat_map(|w| [w & 0xffff, w >> 16]).collect();
+        let flag = |which| self.bits(slot, which) >> k & 1 == 1;
+        Brick {
+            number,
+            surface: flag(FIELD_SURFACE),
+            has_balls: flag(FIELD_BALLS),
+            nodes,
+            inside: bits(&record[FIELD_INSIDE as usize..]),
+            cells,
+            corners,
+            balls,
+        }
+    }
+
+    fn corners(&self, cell: u32) -> [Corner; 8] {
+        let words = &self.cells[(FIELD_CELL_RECORD * cell) as usize..][..FIELD_CELL_RECORD as usize];
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|c| (bytes[c], [8, 16, 24].map(|at| bytes[at + c] as i8)))
     }
 
     /// The number of a brick, as readers find it; 0 where there is none.
     pub fn find(&self, brick: Place) -> u32 {
-        let [x, y, z] = brick.map(|c| c as u32);
+        let block: IVec3 = IVec3::from(brick) >> 2;
+        let [x, y, z] = block.to_array().map(|c| c as u32);
         let mixed = x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77) ^ z.wrapping_mul(0xc2b2_ae3d);
         let mixed = (mixed ^ mixed >> 15).wrapping_mul(0x2c1b_3c6d);
         let hash = mixed ^ mixed >> 13;
-        let slots = (0..FIELD_PROBES).map(|i| self.directory[(hash.wrapping_add(i)) as usize % self.directory.len()]);
-        let tagged = slots.take_while(|word| *word != 0).filter(|word| word >> FIELD_TAG == (hash >> FIELD_TAG).max(1));
-        let mut numbers = tagged.map(|word| word & FIELD_MOST_BRICKS);
-        numbers.find(|number| self.place(*number) == brick).unwrap_or(0)
+        let slots = (0..FIELD_PROBES).map(|i| hash.wrapping_add(i) as usize % self.slots());
+        let mut own = slots.take_while(|s| self.slot(*s)[0] != 0).filter(|s| self.place(*s) == block);
+        let local = IVec3::from(brick) & 3;
+        own.next().and_then(|slot| self.number(slot, (local.x | local.y << 2 | local.z << 4) as u32)).unwrap_or(0)
     }
 }
 
-/// The field at a node, from bricks; 0 where there is none.
+/// Two words as one, the lower bits first.
+fn bits(words: &[u32]) -> u64 {
+    u64::from(words[0]) | u64::from(words[1]) << 32
+}
+
+/// The field at a node times [`FIELD_ONE`], from bricks; 0 where there is none.
 pub fn node_of(bricks: &BTreeMap<Place, Brick>, node: Place) -> u32 {
     let edge = FIELD_BRICK as i32;
     let [x, y, z] = node.map(|c| c.rem_euclid(edge) as usize);
@@ -195,7 +252,19 @@ pub fn node_of(bricks: &BTreeMap<Place, Brick>, node: Place) -> u32 {
     bricks.get(&node.map(|c| c.div_euclid(edge))).map_or(0, |b| b.nodes[x + edge_nodes * (y + edge_nodes * z)])
 }
 
+/// The same as a walk finds it.
+pub fn corner_of(bricks: &BTreeMap<Place, Brick>, level: u32, node: Place) -> Corner {
+    let beside = |by: i32| {
+        [0, 1, 2].map(|axis| {
+            let mut other = node;
+            other[axis] += by;
+            node_of(bricks, other)
+        })
+    };
+    corner(level, node_of(bricks, node), [beside(-1), beside(1)])
+}
+
 /// A level or density in the whole numbers of a node.
-pub fn whole(density: f64) -> f64 {
-    density * f64::from(FIELD_ONE)
+pub fn whole(density: f64) -> u32 {
+    (density * f64::from(FIELD_ONE)).round() as u32
 }
