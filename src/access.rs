@@ -3,7 +3,7 @@
 use ash::vk::{self, AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};
 
 /// One way of using a resource: it fixes pipeline stage, memory access and image layout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Access {
     /// Sampled (or storage-buffer) read in compute.
     ComputeRead,

@@ -94,6 +94,10 @@ pub struct FrameInput<'a> {
     pub settings: &'a Settings,
     /// Positions on the device, to be prepared in this frame and drawn instead of [`crate::Renderer::set_particles`]'s.
     pub positions: Option<DevicePositions>,
+    /// Whether the particles are those of the frame recorded before, and have not moved since: then what follows from them
+    /// alone is kept (their order, classes and ellipsoids, a density field), and only what hangs on the view is done. Where that
+    /// cannot be, since other settings ask for something else of them or they were given anew, it is done all the same.
+    pub still: bool,
     /// Host's opaque scene, if there is one.
     pub scene: Option<SceneInput>,
     /// What is seen where no liquid is.
@@ -173,6 +177,7 @@ impl<'a> FrameInput<'a> {
             camera,
             settings,
             positions: None,
+            still: false,
             scene: None,
             background: Background::Environment,
             environment: None,
@@ -185,6 +190,12 @@ impl<'a> FrameInput<'a> {
     #[must_use]
     pub fn positions(self, positions: impl Into<Option<DevicePositions>>) -> Self {
         FrameInput { positions: positions.into(), ..self }
+    }
+
+    /// The same of particles that have not moved since the frame before, or of others.
+    #[must_use]
+    pub fn still(self, still: bool) -> Self {
+        FrameInput { still, ..self }
     }
 
     /// The same before a scene of the host's, or without one.

@@ -60,6 +60,10 @@ pub struct Renderer {
     pub(crate) counters: [Vec<&'static str>; 2],
     /// What classes the last frame left, if any.
     last_classes: Option<Kept>,
+    /// What the last frame's particles were, and all that was done for them alone.
+    last_particles: Option<(u64, Given)>,
+    /// How often particles, or what goes with them, were given.
+    given: u64,
 }
 
 /// What the renderer remembers of the particles it was given.
@@ -69,6 +73,16 @@ struct SceneBounds {
     splash: usize,
     body: usize,
     bounds: (Vec3, Vec3),
+}
+
+/// Where the particles of a frame come from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Given {
+    /// On the device: buffer, offset and range of their positions and ids.
+    positions: (vk::Buffer, u64, u64),
+    ids: (vk::Buffer, u64, u64),
+    /// By the host: how often it has given some.
+    times: u64,
 }
 
 impl Renderer {
@@ -118,6 +132,8 @@ impl Renderer {
             #[cfg(feature = "inspect")]
             counters: Default::default(),
             last_classes: None,
+            last_particles: None,
+            given: 0,
         };
         for _ in 0..renderer.host.frames_in_flight {
             match Slot::new(&renderer.host) {
@@ -276,14 +292,19 @@ impl Renderer {
         if let Some(p) = &mut scene.prepare {
             p.anew = kept != self.last_classes;
         }
-        let plan = frame::plan(&scene)?;
+        let mut plan = frame::plan(&scene)?;
         self.check_bindings(&plan, scene.count, input.positions.as_ref())?;
         input.check_handles()?;
         check_memory(&self.host, &self.limits, &self.tables, &plan)?;
         self.pipelines.make(&self.host, plan.recipes())?;
 
+        let particles = (plan.work_for_particles(), Given { positions, ids, times: self.given });
+        let keep = input.still && self.last_particles == Some(particles) && self.tables[0].fits(&plan, Home::Particles);
+        if keep {
+            plan.keep_particles();
+        }
         // None, should what follows fail.
-        self.last_classes = None;
+        (self.last_classes, self.last_particles) = (None, None);
         let slot = &mut self.slots[input.slot];
         // The slot's last frame has completed, and with it every frame before.
         self.retired.collect(&self.host, slot.frame);
@@ -291,9 +312,11 @@ impl Renderer {
         self.frame += 1;
         for (table, home) in self.tables.iter_mut().zip(HOMES) {
             table.fit(&self.host, &plan, home, &mut self.retired, self.frame)?;
-            table.discard_contents();
+            if home == Home::View || !keep {
+                table.discard_contents();
+            }
         }
-        self.last_classes = kept;
+        (self.last_classes, self.last_particles) = (kept, Some(particles));
         #[cfg(feature = "inspect")]
         {
             self.surfaces = plan.surfaces;
@@ -358,7 +381,7 @@ impl Renderer {
         for table in &mut self.tables {
             table.retire_all(&mut self.retired, self.frame + 1);
         }
-        self.last_classes = None;
+        (self.last_classes, self.last_particles) = (None, None);
         if let Some(slot) = self.slots.get_mut(slot) {
             // That this slot is free again says nothing of frames before this one, which may still run.
             slot.frame = 0;

@@ -27,7 +27,7 @@ pub(crate) struct Buffer {
 }
 
 /// How an image is made; also what its memory is computed from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ImageSpec {
     /// Format.
     pub format: vk::Format,
@@ -230,7 +230,7 @@ impl Resource {
 }
 
 /// An image or a buffer, as it has to be made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Spec {
     /// An image.
     Image(ImageSpec),

@@ -31,7 +31,7 @@ pub enum Scalar {
 }
 
 /// One binding of a shader.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Binding {
     /// Index in set 0.
     pub index: u32,
@@ -42,7 +42,7 @@ pub struct Binding {
 }
 
 /// Kinds of descriptors that passes use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// `texture…` without a sampler.
     SampledImage(Texels),
@@ -59,7 +59,7 @@ pub enum Kind {
 }
 
 /// What an image holds and how it is addressed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Texels {
     /// Unsigned integers, not floats.
     pub uint: bool,

@@ -95,6 +95,7 @@ fn takes<W: Word>(declared: Option<Scalar>) -> bool {
 }
 
 /// One use of a pipeline.
+#[derive(Hash)]
 pub(crate) struct Call {
     pub recipe: Recipe,
     /// By index in set 0, filled from `named` when the call is added to a plan.
@@ -108,7 +109,7 @@ pub(crate) struct Call {
     wrong: Option<String>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Touch {
     Read,
     Write,

@@ -20,6 +20,7 @@ use crate::{
     scale::Scale,
 };
 use ash::vk;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A resource of one plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -52,7 +53,7 @@ pub(crate) enum External {
 }
 
 /// How a resource comes to be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Made {
     Own(Spec),
     Given(External),
@@ -183,6 +184,22 @@ impl Plan {
             let name = declared.name;
             self.refuse(pass, format!("{name} cannot be used for {access:?}"));
         }
+    }
+
+    /// What is done for the particles, whatever the view, as a number: that of a plan which does the same to resources made in the
+    /// same way is the same.
+    pub fn work_for_particles(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for step in self.steps.iter().filter(|s| s.home == Home::Particles) {
+            step.hash(&mut hasher);
+            step.uses.iter().for_each(|(target, _)| self.resource(*target).made.hash(&mut hasher));
+        }
+        hasher.finish()
+    }
+
+    /// Leaves out what is done for the particles: they are as they were, and so is all that follows from them alone.
+    pub fn keep_particles(&mut self) {
+        self.steps.retain(|s| s.home != Home::Particles);
     }
 
     /// Every pipeline that the frame binds, each once.

@@ -3,9 +3,11 @@
 use super::{Call, External, Made, Plan, Target, call::Blend};
 use crate::access::Access;
 use ash::vk;
+use std::hash::{Hash, Hasher};
 
 /// One thing that is recorded, with everything it touches; steps of one pass that follow each other share a label and a
 /// pair of timestamps.
+#[derive(Hash)]
 pub(crate) struct Step {
     pub pass: &'static str,
     pub home: super::Home,
@@ -15,6 +17,7 @@ pub(crate) struct Step {
     pub work: Work,
 }
 
+#[derive(Hash)]
 pub(crate) enum Work {
     /// One word, all over a range of a buffer.
     Fill {
@@ -34,7 +37,7 @@ pub(crate) enum Work {
 }
 
 /// Work groups of a dispatch.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Hash)]
 pub(crate) enum Groups {
     Direct([u32; 3]),
     /// From a buffer, at an offset in bytes.
@@ -42,7 +45,7 @@ pub(crate) enum Groups {
 }
 
 /// What is drawn.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Hash)]
 pub(crate) enum Vertices {
     /// So many vertices of one instance.
     Direct(u32),
@@ -51,6 +54,7 @@ pub(crate) enum Vertices {
 }
 
 /// What is drawn into.
+#[derive(Hash)]
 pub(crate) struct Rendering {
     pub colors: Vec<Color>,
     pub depth: Option<Depth>,
@@ -70,6 +74,18 @@ pub(crate) struct Depth {
     pub target: Target,
     pub clear: f32,
     pub compare: vk::CompareOp,
+}
+
+impl Hash for Color {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (self.target, self.layer, self.clear.map(|c| c.map(f32::to_bits)), self.blend).hash(state);
+    }
+}
+
+impl Hash for Depth {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (self.target, self.clear.to_bits(), self.compare).hash(state);
+    }
 }
 
 impl Rendering {

@@ -70,6 +70,7 @@ impl Renderer {
         for old in self.particles.replace(arrays).into_iter().flatten() {
             self.retire(Resource::Buffer(old));
         }
+        self.given += 1;
         let bounds = particles.bounds().unwrap_or_default();
         self.speeds.take().into_iter().for_each(|old| self.retire(Resource::Buffer(old)));
         self.points.take().into_iter().for_each(|old| self.retire(Resource::Buffer(old)));
@@ -120,6 +121,7 @@ impl Renderer {
             let density = if p.class == Class::Splash { -p.density } else { p.density };
             to.copy_from_slice(bytemuck::bytes_of(&(p.position * unit).extend(density)));
         }
+        self.given += 1;
         if let Some(old) = self.points.replace(buffer) {
             self.retire(Resource::Buffer(old));
         }

@@ -30,6 +30,7 @@ mod space;
 mod speckle;
 mod splat;
 mod spray;
+mod still;
 mod support;
 mod walk;
 mod walls;

@@ -41,6 +41,9 @@ pub struct Args {
     /// Frames before them
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub warmup: u32,
+    /// The particles do not move: what follows from them alone is done in the first frames only
+    #[arg(long)]
+    pub still: bool,
     /// Where to write the figures: .json or .csv; the terminal shows them in any case
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
@@ -253,7 +256,7 @@ fn measure(
     let settings = picture.frame_settings(particles)?;
     let upload = scene.give(picture.preparer(), &settings, session)?;
     let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
-    input.eye_inside = scene.inside(eye);
+    (input.eye_inside, input.still) = (scene.inside(eye), args.still);
     input.positions = upload.as_ref().map(|u| scene.on_device(u));
     let bar = progress(u64::from(args.warmup + args.frames), "frames");
     let mut frames: Vec<FrameTimes> = Vec::new();

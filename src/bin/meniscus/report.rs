@@ -181,7 +181,7 @@ fn parameters(runs: &[Run]) -> Vec<(String, String)> {
 fn table(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> Result<Vec<u8>, Box<dyn Error>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     let measured = ["scene", "method", "particles", "pass", "median_ms", "p5_ms", "p95_ms", "bytes_per_particle"];
-    let constant = ["frames", "warmup", "device", "driver", "commit", "seed"];
+    let constant = ["frames", "warmup", "still", "device", "driver", "commit", "seed"];
     let asked: Vec<_> = picture.record_rest().into_iter().flat_map(|(name, value)| flat(&name, value)).collect();
     let parameters = parameters(runs);
     let units = |(name, unit): &(String, String)| match unit.as_str() {
@@ -204,6 +204,7 @@ fn table(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> R
                 format!("{:.3}", run.bytes_per_particle(picture.preparer().on_device())),
                 args.frames.to_string(),
                 args.warmup.to_string(),
+                args.still.to_string(),
                 device.name.clone(),
                 device.driver.clone(),
                 COMMIT.to_owned(),
@@ -252,6 +253,7 @@ fn tree(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> Re
             "times": "GPU timestamps around each pass; passes of one name summed; every frame waited for",
             "frames": args.frames,
             "warmup": args.warmup,
+            "still": args.still,
             "size": picture.size,
             "supersample": picture.supersample,
             "seed": SEED,
