@@ -1,27 +1,23 @@
 // The walk of one view ray through the liquid that a density field and balls are, and the light it brings back: what walk.frag
-// does in maps, without a view. DEBUG, SCENE, CUBE as there. EMPTY: where there is no liquid.
+// does in maps, without a view. DEBUG, SCENE, CUBE as there.
 #version 460
-// Compiled with any of: DEBUG, SCENE, CUBE, EMPTY
+// Compiled with any of: DEBUG, SCENE, CUBE
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
 #include "frame.glsl"
 #include "optics.glsl"
 #include "field.glsl"
-#ifndef EMPTY
 layout(constant_id = 0) const uint REFRACTIONS = 4;
 layout(constant_id = 1) const uint INTERNAL_REFLECTIONS = 4;
 layout(constant_id = 2) const bool EXACT_FRESNEL = false;
-#endif
 layout(constant_id = 3) const bool ENCODE_SRGB = false;
 layout(constant_id = 4) const bool HOST_BACKGROUND = false; // only liquid is drawn, over what is there
-#ifndef EMPTY
 layout(push_constant) uniform PushBlock {
     uint slots;    // of the directory
     float ball;    // radius of a ball, in spacings
     float spacing; // of the nodes, in particle radii
 } push;
-#endif
 layout(location = 0) out vec4 out_color;
 #ifdef DEBUG
 layout(location = 1) out vec4 out_walk;      // pattern, outcome, hits, length inside
@@ -29,17 +25,6 @@ layout(location = 2) out vec4 out_direction; // world space; w: surfaces whose n
 #endif
 #include "environment.glsl"
 #include "scene.glsl"
-#ifdef EMPTY
-void main() {
-    if (HOST_BACKGROUND) discard;
-    vec3 dir = normalize(view_ray(gl_FragCoord.xy)), color = behind(ivec2(gl_FragCoord.xy), dir);
-    out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
-#ifdef DEBUG
-    out_walk = vec4(float(PATTERN_NONE), float(OUTCOME_NO_LIQUID), 0.0, 0.0);
-    out_direction = vec4(transpose(mat3(frame.view)) * dir, 0.0);
-#endif
-}
-#else
 #include "line.glsl"
 #include "background.glsl"
 #include "field_space.glsl"
@@ -230,4 +215,3 @@ void main() {
     int pattern = w.second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + w.second;
     write_pixel(w.color, pattern, outcome, w);
 }
-#endif

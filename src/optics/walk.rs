@@ -1,6 +1,6 @@
 //! The walk of each view ray through the liquid, and its colour (`glsl/optics/walk.frag`; Imai16 §4.4, §4.5).
 
-use super::{Fresnel, field_walk, walls};
+use super::{Fresnel, field_walk, tiles, walls};
 use crate::{
     frame::Scene,
     input::{Background, EnvironmentShape},
@@ -52,15 +52,17 @@ impl Walk {
     }
 
     pub(super) fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
-        let draws = match &surfaces.field {
+        let mut draws = Vec::new();
+        let (call, vertices) = match &surfaces.field {
             Some(field) => {
-                field_walk::draws(plan, scene, field, |plan, call, empty| self.light(plan, scene, call, !empty))
+                let (tiles, liquid) = field_walk::draw(plan, scene, field);
+                // A point at the view's border may reach into the tile before: liquid is drawn over what is seen past it.
+                draws.extend(tiles::past(plan, scene, &tiles));
+                liquid
             }
-            None => {
-                let call = self.maps(plan, scene, surfaces);
-                vec![(self.light(plan, scene, call, true), Vertices::Direct(3))]
-            }
+            None => (self.maps(plan, scene, surfaces), Vertices::Direct(3)),
         };
+        draws.push((self.light(plan, scene, call), vertices));
         let output = plan.given(External::Output(scene.output));
         let mut rendering = Rendering::into(output, 0).keeping(scene.background == Background::Host);
         if scene.walks {
@@ -71,24 +73,16 @@ impl Walk {
         plan.render("walk", rendering, draws);
     }
 
-    /// What light a ray brings back, and if it `walks` what becomes of it on the way.
-    fn light(&self, plan: &mut Plan, scene: &Scene, call: Call, walks: bool) -> Call {
-        let mut call = call
+    /// What becomes of light on the way, and what it brings back.
+    fn light(&self, plan: &mut Plan, scene: &Scene, call: Call) -> Call {
+        let call = call
             .read("environment", plan.given(External::Environment))
             .constant("ENCODE_SRGB", scene.encode_srgb())
-            .constant("HOST_BACKGROUND", scene.background == Background::Host);
-        if walks {
-            call = call
-                .constant("REFRACTIONS", self.refractions)
-                .constant("INTERNAL_REFLECTIONS", self.internal_reflections)
-                .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact);
-        }
-        if scene.has_scene {
-            call = call
-                .read("scene_color", plan.given(External::SceneColor))
-                .read("scene_depth", plan.given(External::SceneDepth));
-        }
-        call
+            .constant("HOST_BACKGROUND", scene.background == Background::Host)
+            .constant("REFRACTIONS", self.refractions)
+            .constant("INTERNAL_REFLECTIONS", self.internal_reflections)
+            .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact);
+        tiles::with_scene(plan, scene, call)
     }
 
     /// The walk through maps of depths.
