@@ -7,6 +7,7 @@ use crate::{
     input::{Background, EnvironmentShape},
     layers::{Kind, Surfaces},
     method::Offers,
+    optics::walk::Walk,
     passes::{Arrays, Points, compact, cull, extent, occlude, shape, sort},
     plan::{Home, Plan},
     scale::Scale,
@@ -52,6 +53,7 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
                 surfaces.body = layered.body.map(|body| smooth::record(&mut plan, &method.smooth, &body));
                 (surfaces.splash, surfaces.thickness, surfaces.speed) =
                     (layered.splash, layered.thickness, layered.speed);
+                surfaces.tiles = culled.tiles;
                 plan.work_at(Scale::Full);
             }
             Kind::Field(field) => {
@@ -172,6 +174,11 @@ impl<'a> Scene<'a> {
     /// Sides of each class that are drawn: front only, or front and back.
     pub fn sides(&self) -> u32 {
         if self.asks().backs { 2 } else { 1 }
+    }
+
+    /// Whether the optics draw tiles of the view that have liquid apart from those that have none.
+    pub fn tiled(&self) -> bool {
+        Walk::of(&self.settings.method.optics).is_some()
     }
 
     /// Whether hidden particles are dropped before drawing. That only saves time: where its bounds do not fit a storage

@@ -9,6 +9,7 @@ pub mod split;
 use crate::{
     frame::Scene,
     method::Offers,
+    optics::tiles::Tiles,
     parameters::family,
     passes::Drawn,
     plan::{Plan, Target},
@@ -87,6 +88,8 @@ pub(crate) struct Surfaces {
     pub thickness: Option<Target>,
     /// As of [`Layered::speed`].
     pub speed: Option<Target>,
+    /// Where in the view there may be any, if the optics ask: only of maps.
+    pub tiles: Option<Tiles>,
     /// Where the surface is that of a density field.
     pub field: Option<field::Volume>,
 }

@@ -7,7 +7,7 @@ pub(crate) mod lookup;
 pub mod one;
 pub mod ssfr;
 pub mod ssfr_index;
-mod tiles;
+pub(crate) mod tiles;
 pub mod two;
 pub(crate) mod walk;
 mod walls;

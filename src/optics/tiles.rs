@@ -6,7 +6,7 @@ use crate::{
     frame::Scene,
     input::Background,
     plan::{Call, External, Plan, Target, Vertices},
-    shader::{Shader, TILES_FRAG, TILES_VERT},
+    shader::{Shader, TILES_FRAG, TILES_VERT, VIEW_VERT},
 };
 use ash::vk;
 
@@ -46,12 +46,17 @@ impl Tiles {
     }
 }
 
-/// The draw of what is seen where there is no liquid: in empty tiles. The host's picture stays where it is.
-pub(super) fn past(plan: &mut Plan, scene: &Scene, tiles: &Tiles) -> Option<(Call, Vertices)> {
+/// The draw of what is seen where there is no liquid: in empty tiles, or without tiles everywhere. The host's picture stays
+/// where it is.
+pub(super) fn past(plan: &mut Plan, scene: &Scene, tiles: Option<&Tiles>) -> Option<(Call, Vertices)> {
     if scene.background == Background::Host {
         return None;
     }
-    let (call, vertices) = tiles.draw(plan, scene, &TILES_FRAG[variant(scene)], true);
+    let fragment = &TILES_FRAG[variant(scene)];
+    let (call, vertices) = match tiles {
+        Some(tiles) => tiles.draw(plan, scene, fragment, true),
+        None => (Call::draw(&VIEW_VERT, fragment), Vertices::Direct(3)),
+    };
     let call = call.read("environment", plan.given(External::Environment)).constant("ENCODE_SRGB", scene.encode_srgb());
     Some((with_scene(plan, scene, call), vertices))
 }

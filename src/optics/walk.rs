@@ -1,13 +1,17 @@
 //! The walk of each view ray through the liquid, and its colour (`glsl/optics/walk.frag`; Imai16 §4.4, §4.5).
 
-use super::{Fresnel, field_walk, tiles, walls};
+use super::{
+    Fresnel, field_walk,
+    tiles::{self, Tiles},
+    walls,
+};
 use crate::{
     frame::Scene,
     input::{Background, EnvironmentShape},
     layers::{Surface, Surfaces},
     plan::{Call, External, Plan, Rendering, Target, Vertices},
     resources::ImageSpec,
-    shader::{VIEW_VERT, WALK_FRAG},
+    shader::WALK_FRAG,
 };
 use ash::vk::Format;
 
@@ -40,7 +44,6 @@ pub struct Walk {
 
 impl Walk {
     /// The walk that optics stand for, if they are one.
-    #[cfg(feature = "inspect")]
     pub fn of(optics: &super::Optics) -> Option<Walk> {
         use super::Optics;
         match *optics {
@@ -52,17 +55,16 @@ impl Walk {
     }
 
     pub(super) fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
-        let mut draws = Vec::new();
-        let (call, vertices) = match &surfaces.field {
-            Some(field) => {
-                let (tiles, liquid) = field_walk::draw(plan, scene, field);
-                // A point at the view's border may reach into the tile before: liquid is drawn over what is seen past it.
-                draws.extend(tiles::past(plan, scene, &tiles));
-                liquid
-            }
-            None => (self.maps(plan, scene, surfaces), Vertices::Direct(3)),
+        let liquid = match (&surfaces.field, surfaces.tiles) {
+            (Some(field), _) => Some(field_walk::draw(plan, scene, field)),
+            (None, Some(tiles)) => Some((tiles, self.maps(plan, scene, surfaces, &tiles))),
+            (None, None) => None,
         };
-        draws.push((self.light(plan, scene, call), vertices));
+        // A point at the view's border may reach into the tile before: liquid is drawn over what is seen past it.
+        let mut draws = Vec::from_iter(tiles::past(plan, scene, liquid.as_ref().map(|(tiles, _)| tiles)));
+        if let Some((_, (call, vertices))) = liquid {
+            draws.push((self.light(plan, scene, call), vertices));
+        }
         let output = plan.given(External::Output(scene.output));
         let mut rendering = Rendering::into(output, 0).keeping(scene.background == Background::Host);
         if scene.walks {
@@ -86,25 +88,27 @@ impl Walk {
     }
 
     /// The walk through maps of depths.
-    fn maps(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) -> Call {
+    fn maps(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces, tiles: &Tiles) -> (Call, Vertices) {
         // Of a class without particles the shader does not look at its maps, but something has to be bound: the other
         // class's, or without any particles what no shader has written.
         let any = surfaces.body.or(surfaces.splash).unwrap_or_else(|| placeholder(plan));
         let (body, splash) = (surfaces.body.unwrap_or(any), surfaces.splash.unwrap_or(any));
         // One refraction looks at fronts alone.
-        let walls = match self.refractions > 1 && scene.count > 0 {
+        let walls = match self.refractions > 1 {
             true => walls::record(plan, surfaces, &body, &splash),
             false => walls::placeholder(plan),
         };
 
-        Call::draw(&VIEW_VERT, &WALK_FRAG[variant(scene)])
+        let (call, vertices) = tiles.draw(plan, scene, &WALK_FRAG[variant(scene)], false);
+        let call = call
             .read("walls", walls)
             .read("body_depth", body.depth)
             .read("body_normal", body.normal)
             .read("splash_depth", splash.depth)
             .read("splash_normal", splash.normal)
             .constant("HAS_SPLASH", surfaces.splash.is_some())
-            .constant("HAS_BODY", surfaces.body.is_some())
+            .constant("HAS_BODY", surfaces.body.is_some());
+        (call, vertices)
     }
 }
 

@@ -9,6 +9,7 @@ pub(crate) mod shape;
 pub(crate) mod sort;
 
 use crate::{
+    optics::tiles::Tiles,
     plan::{Call, External, Groups, Plan, Target},
     shader::{BLOCK, MOST_GROUPS, PARTICLE_GROUP},
 };
@@ -58,6 +59,8 @@ pub(crate) struct Culled {
     pub visible: Target,
     /// For each class how many particles are larger than a point can be.
     pub large: Target,
+    /// Tiles of the view in which any shows, if the optics ask.
+    pub tiles: Option<Tiles>,
 }
 
 /// What is left to draw of them.

@@ -14,6 +14,7 @@ pub mod shape;
 pub mod sort;
 pub mod splat;
 pub mod texels;
+pub mod tiles;
 pub mod upsample;
 pub mod walk;
 pub mod walls;

@@ -32,5 +32,6 @@ mod splat;
 mod spray;
 mod still;
 mod support;
+mod tiles;
 mod walk;
 mod walls;
