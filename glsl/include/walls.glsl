@@ -31,12 +31,16 @@ float bilinear(vec4 d, vec2 weight, float low) {
 
 // The body at a position, as a ray at depth d meets it.
 struct Body {
-    float g;      // negative inside
-    float spread; // of the depths that were interpolated; 0 where they were not
-    int side;     // whose term of g is the larger
-    bvec2 whole;  // front, back: whether they were interpolated
     vec2 terms;   // of g: F - d, d - B
+    float spread; // of the depths that were interpolated; 0 where they were not
+    bvec2 whole;  // front, back: whether they were interpolated
 };
+
+// Negative inside.
+float g_of(vec2 terms) { return max(terms.x, terms.y); }
+
+// Whose term of g is the larger.
+int side_of(vec2 terms) { return terms.x > terms.y ? SIDE_FRONT : SIDE_BACK; }
 
 Body body_at(vec2 position, float d) {
     Footprint p = footprint(position);
@@ -52,10 +56,8 @@ Body body_at(vec2 position, float d) {
     bvec2 whole = bvec2(all_there && high.x - low.x <= jump, all_there && high.y - low.y <= jump);
     float front = whole.x ? bilinear(vec4(a.x, b.x, c.x, e.x), p.weight, low.x) : own.x;
     float back = whole.y ? bilinear(vec4(a.y, b.y, c.y, e.y), p.weight, low.y) : own.y;
-    float before = front - d, behind = d - back;
     float spread = max(whole.x ? high.x - low.x : 0.0, whole.y ? high.y - low.y : 0.0);
-    vec2 terms = own.y > 0.0 ? vec2(before, behind) : vec2(HOLE);
-    return Body(max(terms.x, terms.y), spread, before > behind ? SIDE_FRONT : SIDE_BACK, whole, terms);
+    return Body(own.y > 0.0 ? vec2(front - d, d - back) : vec2(HOLE), spread, whole);
 }
 
 vec3 body_normal_of(int side, ivec2 pixel) { return decode_normal(texelFetch(body_normal, ivec3(pixel, side), 0).x); }
@@ -80,14 +82,14 @@ vec2 outward(ivec2 pixel, float d, vec2 along) {
     return dot(sum, sum) > 0.25 ? sum : along;
 }
 
-// Of a side wall at x: `inner` is the pixel that holds the ray where it is inside, `outer` the body just across the wall, `across` the
-// way on the screen that the ray takes outwards.
-vec3 side_normal(ivec2 inner, Body outer, vec3 x, vec2 across) {
+// Of a side wall at x: `inner` is the pixel that holds the ray where it is inside, `outer` the terms of g just across the wall, `across`
+// the way on the screen that the ray takes outwards.
+vec3 side_normal(ivec2 inner, vec2 outer, vec3 x, vec2 across) {
     // The plane through the eye along the edge on the screen.
     vec2 c = frame.pixel_scale * outward(inner, -x.z, across);
     vec3 edge = normalize(vec3(c, dot(c, x.xy) / -x.z));
     vec3 front = body_normal_of(SIDE_FRONT, inner), back = body_normal_of(SIDE_BACK, inner), sight = normalize(x);
-    vec3 limb = outer.g < HOLE ? (outer.side == SIDE_FRONT ? front : back) : 0.5 * (front + back);
+    vec3 limb = g_of(outer) < HOLE ? (side_of(outer) == SIDE_FRONT ? front : back) : 0.5 * (front + back);
     limb -= dot(limb, sight) * sight;
     float weight = dot(limb, edge) > 0.0 ? min(dot(limb, limb), 1.0) : 0.0;
     return normalize(mix(edge, limb, weight));
@@ -174,61 +176,60 @@ struct Wall {
     Ball ball;   // of a splash
 };
 
-// A bracket around a wall: at a the ray is on its own side, at b on the other.
+// A bracket around a wall: at a the ray is on its own side, at b on the other. March loops only find it, and keep little alive: what
+// has to be known of the body there is its terms of g.
 struct Bracket {
     float a;
     float b;
-    Body at_a;
-    Body at_b;
-    Body first; // at the ray's start
+    vec2 at_a;
+    vec2 at_b;
     bool own; // false: it has not been on its own side yet, and a is where it still counts as there
 };
 
 // Whether a ray that is a little on the other side of the front or back on which it has just started counts as on its own all the
-// same: a map's depths and its normals do not put a surface at quite the same place. f is g inside and -g outside.
-bool overlooked(float f, Body body, Body first, float s, float pixel, float d) {
-    bool started = s < START_PIXELS * pixel && abs(first.g) <= accepted_at(d);
-    return started && body.side == first.side && f >= 0.0 && f <= start_accepted_at(d);
+// same: a map's depths and its normals do not put a surface at quite the same place. f is g inside and -g outside, of these terms;
+// `first` are those at the ray's start.
+bool overlooked(float f, vec2 terms, vec2 first, float s, float pixel, float d) {
+    bool started = s < START_PIXELS * pixel && abs(g_of(first)) <= accepted_at(d);
+    return started && side_of(terms) == side_of(first) && f >= 0.0 && f <= start_accepted_at(d);
 }
 
 // Samples g pixel by pixel from s on, until the ray has changed sides. Else s is where it is clear of the body's walls again
 // beyond `alarmed`, or 1.
-bool find_bracket(ScreenLine line, bool inside, float pixel, float alarmed, inout float s, out Bracket k) {
+bool find_bracket(ScreenLine line, bool inside, float pixel, float alarmed, vec2 first, inout float s, out Bracket k) {
     float sign_of_side = inside ? 1.0 : -1.0, at = clamp(0.5 * (s + alarmed), min(0.5 * pixel, 1.0), 1.0), back = pixel;
     vec2 along = line.end - line.start;
-    Body first = body_at(line.start, depth_at(line, 0.0));
-    k = Bracket(0.0, 0.0, first, first, first, false);
+    k = Bracket(0.0, 0.0, first, first, false);
     // Further on, the pixels' own depths may have noticed the wall late.
     bool known = s <= START_PIXELS * pixel, crossed = false, clear = false;
     for (int i = 0; i < CROSS_STEPS && !crossed && !clear; ++i) {
         float d = depth_at(line, at);
         Body body = body_at(line.start + at * along, d);
-        float f = sign_of_side * body.g;
-        bool beside = overlooked(f, body, k.first, at, pixel, d);
+        float f = sign_of_side * g_of(body.terms);
+        bool beside = overlooked(f, body.terms, first, at, pixel, d);
         // On the far side of a thin body the other term is the larger.
-        bool across = !inside && known && k.at_a.g < HOLE && body.g < HOLE && body.side != k.at_a.side;
+        bool across = !inside && known && g_of(k.at_a) < HOLE && g_of(body.terms) < HOLE && side_of(body.terms) != side_of(k.at_a);
         if (beside || (f < 0.0 && !across)) {
             known = true;
             clear = at >= 1.0 || (at >= alarmed && -f > body.spread);
             // Where it was on its side before, that is where it will have crossed.
             if (!beside || !k.own) {
                 k.a = at;
-                k.at_a = body;
+                k.at_a = body.terms;
             }
             k.own = k.own || !beside;
-        } else {
-            k.b = at;
-            k.at_b = body;
-            crossed = known;
-        }
-        if (known && !crossed) {
             s = at;
             at = min(at + pixel, 1.0);
-        } else if (!crossed) {
-            // Back to where the ray was on its side.
-            at = max(at - back, 0.0);
-            back *= 2.0;
-            crossed = at <= START_PIXELS * pixel;
+        } else {
+            k.b = at;
+            k.at_b = body.terms;
+            crossed = known;
+            if (!crossed) {
+                // Back to where the ray was on its side.
+                at = max(at - back, 0.0);
+                back *= 2.0;
+                crossed = at <= START_PIXELS * pixel;
+            }
         }
     }
     return crossed;
@@ -236,9 +237,9 @@ bool find_bracket(ScreenLine line, bool inside, float pixel, float alarmed, inou
 
 // Narrows a bracket, by regula falsi (Illinois) and every other step a halving, around a root of the term of g that is the larger at
 // its outer end: `side`. A ray that has not been on its side yet started at a root, which is not the one that is looked for.
-void narrow(ScreenLine line, bool inside, float pixel, int side, inout Bracket k) {
+void narrow(ScreenLine line, bool inside, float pixel, int side, vec2 first, inout Bracket k) {
     float sign_of_side = inside ? 1.0 : -1.0, kept = 0.0;
-    float fa = min(sign_of_side * k.at_a.terms[side], -1e-6), fb = max(sign_of_side * k.at_b.terms[side], 1e-6);
+    float fa = min(sign_of_side * k.at_a[side], -1e-6), fb = max(sign_of_side * k.at_b[side], 1e-6);
     vec2 along = line.end - line.start;
     bool done = false;
     for (int i = 0; i < NARROW_STEPS && !done; ++i) {
@@ -246,16 +247,16 @@ void narrow(ScreenLine line, bool inside, float pixel, int side, inout Bracket k
         float at = halve ? 0.5 * (k.a + k.b) : k.b - fb * (k.b - k.a) / (fb - fa), d = depth_at(line, at);
         Body body = body_at(line.start + at * along, d);
         float f = sign_of_side * body.terms[side];
-        if (f < 0.0 || (!k.own && overlooked(f, body, k.first, at, pixel, d))) {
+        if (f < 0.0 || (!k.own && overlooked(f, body.terms, first, at, pixel, d))) {
             k.own = k.own || f < 0.0;
             k.a = at;
-            k.at_a = body;
+            k.at_a = body.terms;
             fa = min(f, -1e-6);
             if (kept < 0.0) fb *= 0.5;
             kept = -1.0;
         } else {
             k.b = at;
-            k.at_b = body;
+            k.at_b = body.terms;
             fb = f;
             if (kept > 0.0) fa *= 0.5;
             kept = 1.0;
@@ -264,72 +265,68 @@ void narrow(ScreenLine line, bool inside, float pixel, int side, inout Bracket k
     }
 }
 
-// The wall that the body has between s and where a ray is clear of it again, if it has one; else s is there.
-bool cross_body(Ray ray, ScreenLine line, bool inside, inout float s, float alarmed, out Wall wall) {
+// The wall in a bracket.
+Wall body_wall(Ray ray, ScreenLine line, bool inside, vec2 first, Bracket k) {
     float pixel = 1.0 / max(ray.span, 1e-6);
-    Bracket k;
-    if (!find_bracket(line, inside, pixel, alarmed, s, k)) return false;
-    int side = inside ? k.at_b.side : k.at_a.side;
-    narrow(line, inside, pixel, side, k);
+    int side = side_of(inside ? k.at_b : k.at_a);
+    narrow(line, inside, pixel, side, first, k);
     // The line through both ends, if one is near the surface; else the end that is, or the middle.
     float d = depth_at(line, k.b), accepted = k.own ? accepted_at(d) : start_accepted_at(d);
-    float ga = k.at_a.terms[side], gb = k.at_b.terms[side];
+    float ga = k.at_a[side], gb = k.at_b[side];
     bool near_a = abs(ga) <= accepted, near_b = abs(gb) <= accepted;
     float hit = near_a == near_b ? 0.5 * (k.a + k.b) : (near_a ? k.a : k.b);
     if ((near_a || near_b) && max(abs(ga), abs(gb)) < HOLE && ga != gb) hit = clamp(k.b - gb * (k.b - k.a) / (gb - ga), k.a, k.b);
-    Body inner = k.at_a, outer = k.at_b;
-    float s_inner = k.a;
-    if (!inside) {
-        inner = k.at_b;
-        outer = k.at_a;
-        s_inner = k.b;
-    }
-    bool at_inner = abs(inner.g) <= accepted, surface = at_inner || abs(outer.g) <= accepted;
+    vec2 inner = inside ? k.at_a : k.at_b, outer = inside ? k.at_b : k.at_a;
+    bool at_inner = abs(g_of(inner)) <= accepted, surface = at_inner || abs(g_of(outer)) <= accepted;
     vec2 along = line.end - line.start;
-    wall = Wall(t_at(ray, hit), vec3(0.0), CLASS_BODY, !surface, vec2(0.0), Ball(vec3(0.0), 0.0));
+    Wall wall = Wall(t_at(ray, hit), vec3(0.0), CLASS_BODY, !surface, vec2(0.0), Ball(vec3(0.0), 0.0));
     if (surface) {
-        int which = outer.g < HOLE ? outer.side : inner.side;
-        bvec2 whole = at_inner ? inner.whole : outer.whole;
+        int which = side_of(g_of(outer) < HOLE ? outer : inner);
         // On the border between two pixels, that of the one whose depth is met.
-        vec2 met = line.start + (at_inner == inside ? k.a : k.b) * along;
+        float s_met = at_inner == inside ? k.a : k.b;
+        vec2 met = line.start + s_met * along;
+        bvec2 whole = body_at(met, depth_at(line, s_met)).whole;
         wall.normal = body_normal_at(which, which == SIDE_FRONT ? whole.x : whole.y, line.start + hit * along, nearest(met));
     } else {
         vec3 x = ray.origin + wall.t * ray.dir;
-        wall.normal = side_normal(nearest(line.start + s_inner * along), outer, x, inside ? along : -along);
+        wall.normal = side_normal(nearest(line.start + (inside ? k.a : k.b) * along), outer, x, inside ? along : -along);
         // Off the border between two pixels, so that a ray goes on from the one on its side.
         vec2 ends = vec2(t_at(ray, max(k.a - SIDE_NUDGE * pixel, 0.0)), t_at(ray, min(k.b + SIDE_NUDGE * pixel, 1.0))) - wall.t;
         wall.beside = inside ? ends : ends.yx;
     }
-    return true;
+    return wall;
 }
 
 // The first wall that a ray inside the body, or outside of all liquid, meets. Without one the outcome says why.
 bool find_wall(Ray ray, bool inside, out Wall wall, out int outcome) {
     ScreenLine line = screen_line(ray);
-    float nudge = PIXEL_NUDGE / max(ray.span, 1e-6), s = 0.0;
-    bool found = false;
-    outcome = OUTCOME_NOT_CONVERGED;
-    wall = Wall(0.0, vec3(0.0), CLASS_BODY, false, vec2(0.0), Ball(vec3(0.0), 0.0));
-    for (int i = 0; i < WALL_TRIES && !found && s < 1.0; ++i) {
+    float nudge = PIXEL_NUDGE / max(ray.span, 1e-6), s = 0.0, t_ball = HOLE;
+    vec2 first = vec2(HOLE);
+    if (HAS_BODY) first = body_at(line.start, depth_at(line, 0.0)).terms;
+    Bracket k;
+    ivec2 ball_pixel = ivec2(0);
+    bool crosses = false;
+    for (int i = 0; i < WALL_TRIES && !crosses && t_ball == HOLE && s < 1.0; ++i) {
         Stop stop = skip(line, inside, nudge, s);
         s = stop.s;
-        float t_ball = HOLE;
-        Ball ball = Ball(vec3(0.0), 0.0);
         if (HAS_SPLASH && stop.meets.y && s < 1.0) {
-            ball = ball_at(stop.pixel, stop.splash);
             vec2 t;
-            if (meets_ball(ball, ray.origin, ray.dir, t) && t.x > 1e-4) t_ball = t.x;
+            ball_pixel = stop.pixel;
+            if (meets_ball(ball_at(stop.pixel, stop.splash), ray.origin, ray.dir, t) && t.x > 1e-4) t_ball = t.x;
         }
-        if (HAS_BODY && stop.meets.x && s < 1.0) found = cross_body(ray, line, inside, s, stop.end, wall);
+        if (HAS_BODY && stop.meets.x && s < 1.0) crosses = find_bracket(line, inside, 1.0 / max(ray.span, 1e-6), stop.end, first, s, k);
         else s = stop.end;
-        if (t_ball < HOLE && (!found || t_ball < wall.t)) {
-            found = true;
-            wall = Wall(t_ball, normalize(ray.origin + t_ball * ray.dir - ball.center), CLASS_SPLASH, false, vec2(0.0), ball);
-        }
     }
-    if (!found) {
-        wall.t = ray.reach;
+    outcome = OUTCOME_NOT_CONVERGED;
+    wall = Wall(ray.reach, vec3(0.0), CLASS_BODY, false, vec2(0.0), Ball(vec3(0.0), 0.0));
+    if (!crosses && t_ball == HOLE) {
         if (s >= 1.0) outcome = ray.leaves_view ? OUTCOME_LEFT_VIEW : (inside ? OUTCOME_NO_WALL : OUTCOME_HIT);
+        return false;
     }
-    return found;
+    if (crosses) wall = body_wall(ray, line, inside, first, k);
+    if (HAS_SPLASH && t_ball < (crosses ? wall.t : HOLE)) {
+        Ball ball = ball_at(ball_pixel, walls_at(ball_pixel).zw);
+        wall = Wall(t_ball, normalize(ray.origin + t_ball * ray.dir - ball.center), CLASS_SPLASH, false, vec2(0.0), ball);
+    }
+    return true;
 }

@@ -125,7 +125,7 @@ bool handed_over(inout Walk w, int cls) {
     ivec2 pixel = nearest(project(w.x));
     float d = -w.x.z;
     if (cls == CLASS_SPLASH) {
-        if (!HAS_BODY || body_at(project(w.x), d).g >= 0.0) return false;
+        if (!HAS_BODY || g_of(body_at(project(w.x), d).terms) >= 0.0) return false;
         w.within = CLASS_BODY;
         return true;
     }
