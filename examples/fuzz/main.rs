@@ -16,6 +16,11 @@ use std::time::{Duration, Instant};
 use meniscus::Equirect;
 use meniscus::io::particles::{Invalid, ReadError, check_finite, read_bytes};
 use meniscus::io::{Budget, images::ImageError, images::environment_from_bytes};
+use meniscus::study::{
+    mesh::Mesh,
+    mesh_file::{self, MeshFileError},
+    surface::{MeshSurface, Ray, Surface as _},
+};
 use mutate::Random;
 
 /// Small, so that what goes beyond it is found quickly.
@@ -23,7 +28,10 @@ const BUDGET: Budget = Budget::new(64 << 20);
 /// No input takes longer, in seconds, in a debug build on a busy machine.
 const LONGEST: u64 = 10;
 
-const FORMATS: [&str; 12] = ["xyz", "csv", "ply", "vtk", "vtu", "vtp", "bgeo", "npy", "npz", "png", "hdr", "exr"];
+const FORMATS: [&str; 15] = [
+    "xyz", "csv", "ply", "vtk", "vtu", "vtp", "bgeo", "npy", "npz", "png", "hdr", "exr", "mesh-ply", "mesh-obj",
+    "mesh-npz",
+];
 
 /// The number of the input being read, and when that began, for what watches from outside.
 static CURRENT: AtomicU64 = AtomicU64::new(0);
@@ -141,18 +149,25 @@ fn run(format: &str, args: &Args) -> u32 {
 /// What is wrong with how `content` is read; or "read", or the error it gives.
 fn check(name: &Path, content: &[u8]) -> Result<String, String> {
     let size = content.len();
+    let mut name = name.to_owned();
     allocator::start();
-    let extension = name.extension().unwrap_or_default().to_string_lossy();
+    let extension = name.extension().unwrap_or_default().to_string_lossy().into_owned();
     let (result, allowed) = if matches!(&*extension, "png" | "hdr" | "exr") {
-        let map = environment_from_bytes(name, content, None, &BUDGET);
+        let map = environment_from_bytes(&name, content, None, &BUDGET);
         // Half of the budget is for three copies, one of them here; blocks may take a 32nd, some times over.
         (map.map_err(image_error).map(check_map), BUDGET.bytes() / 2 + 16 * size as u64)
+    } else if let Some(kind) = extension.strip_prefix("mesh-") {
+        name.set_extension(kind);
+        let mesh = mesh_file::from_bytes(&name, content, &BUDGET);
+        // Beside what files take a face of two digits is a list of its own.
+        let allowed = 2 * BUDGET.allowance(size as u64) + 256 * size as u64;
+        (mesh.map_err(mesh_error).map(|mesh| check_mesh(&mesh)), allowed)
     } else {
-        let file = read_bytes(name, content, &BUDGET);
+        let file = read_bytes(&name, content, &BUDGET);
         // Lists that grow may be twice as large as what they hold; libraries take some bytes for each of the file.
         let allowed = 2 * BUDGET.allowance(size as u64) as usize + 128 * size;
         let result = file.map_err(particle_error).map(|mut file| {
-            check_finite(&mut file, Invalid::Drop, name).map_err(|error| error.to_string())?;
+            check_finite(&mut file, Invalid::Drop, &name).map_err(|error| error.to_string())?;
             let n = file.positions.len();
             let lengths = file.classes.as_ref().is_none_or(|c| c.len() == n && c.iter().all(|c| *c < 2))
                 && file.velocities.as_ref().is_none_or(|v| v.len() == n && v.iter().all(|v| v.is_finite()))
@@ -171,7 +186,7 @@ fn check(name: &Path, content: &[u8]) -> Result<String, String> {
     }
     match result {
         Ok(content) => content.map(|()| "read".into()),
-        Err((message, None)) => check_message(name, message),
+        Err((message, None)) => check_message(&name, message),
         Err((_, Some(panic))) => Err(format!("panic: {panic}")),
     }
 }
@@ -191,6 +206,32 @@ fn image_error(error: ImageError) -> Failure {
     match error {
         ImageError::Panicked { panic, .. } => (message, Some(panic)),
         _ => (message, None),
+    }
+}
+
+fn mesh_error(error: MeshFileError) -> Failure {
+    let message = error.to_string();
+    match error {
+        MeshFileError::Panicked { panic, .. } => (message, Some(panic)),
+        MeshFileError::Archive(error) => particle_error(error),
+        _ => (message, None),
+    }
+}
+
+/// Rays can be sent at every mesh that is not refused.
+fn check_mesh(mesh: &Mesh) -> Result<(), String> {
+    if let Err(error) = mesh.check() {
+        return if error.to_string().contains(": ") { Ok(()) } else { Err(format!("no remedy: {error}")) };
+    }
+    let traced = || {
+        let (surface, (low, high)) = (MeshSurface::new(mesh), mesh.bounds());
+        let origin = low - 0.5 * (high - low);
+        surface.hit(&Ray { origin, dir: (0.5 * (low + high) - origin).normalize() }, None)
+    };
+    let seen = std::panic::catch_unwind(traced).map_err(|_| "panic: at a ray".to_owned())?;
+    match seen.is_none_or(|hit| hit.t.is_finite() && hit.geometric.is_finite() && hit.shading.is_finite()) {
+        true => Ok(()),
+        false => Err(format!("read, but a ray meets it at {seen:?}")),
     }
 }
 

@@ -147,7 +147,7 @@ pub fn one(random: &mut Random, seeds: &[Seed], format: &str) -> Vec<u8> {
     for _ in 0..1 + random.below(2) * random.below(4) {
         mutate(random, &mut bytes, seeds);
     }
-    if matches!(format, "npy" | "npz") && random.below(8) != 0 {
+    if matches!(format, "npy" | "npz" | "mesh-npz") && random.below(8) != 0 {
         super::pack::mend_npy(&mut bytes);
     }
     let mut packed = seed.pack(&bytes);

@@ -67,6 +67,18 @@ pub fn of(format: &str) -> Vec<Seed> {
         "png" => vec![PNG_ROWS.to_vec()],
         "hdr" => hdr(),
         "exr" => exr(),
+        "mesh-ply" => mesh_ply(),
+        "mesh-obj" => vec![
+            SOLID.into(),
+            format!(
+                "o a\nvn 0 0 1\nvt 0 1\n{}",
+                SOLID.replace("f 1 2 4", "f 1/1/1 2/1/1 4/1/1").replace("f 1 3 2", "f 1//1 3//1 2//1")
+            )
+            .into(),
+            format!("# note\nmtllib a.mtl\ng one\nusemtl x\ns off\n{SOLID}o two\nf -4 -3 -2 -1\nl 1 2\np 1\n").into(),
+            SOLID.replace('\n', " \\\n\r\n").into(),
+        ],
+        "mesh-npz" => npy(),
         _ => Vec::new(),
     }
     .into_iter()
@@ -83,6 +95,11 @@ pub fn of(format: &str) -> Vec<Seed> {
             |array| pack::npz(&[("center", &npy()[0]), ("axes", array)], Deflated),
             |array| pack::npz(&[("center", &npy()[0]), ("velocity", array)], Stored),
         ],
+        "mesh-npz" => &[
+            |array| pack::npz(&[("vertices", array), ("triangles", &triangles())], Stored),
+            |array| pack::npz(&[("vertices", &corners()), ("triangles", array)], Deflated),
+            |array| pack::npz(&[("vertices", &corners()), ("triangles", &triangles()), ("normals", array)], Deflated),
+        ],
         "png" => &[
             |rows| pack::png(b"\0\0\0\x04\0\0\0\x02\x08\x02\0\0\0", rows),
             |rows| pack::png(b"\0\0\0\x02\0\0\0\x01\x10\x06\0\0\0", rows),
@@ -93,9 +110,9 @@ pub fn of(format: &str) -> Vec<Seed> {
         _ => &[],
     };
     let contents: Vec<Vec<u8>> = seeds.iter().map(|seed| seed.bytes.clone()).collect();
-    seeds.retain(|_| !matches!(format, "npz" | "png"));
+    seeds.retain(|_| !matches!(format, "npz" | "mesh-npz" | "png"));
     seeds.extend(more.iter().flat_map(|pack| contents.iter().map(|bytes| Seed { bytes: bytes.clone(), pack: *pack })));
-    if matches!(format, "png" | "npz") {
+    if matches!(format, "png" | "npz" | "mesh-npz") {
         // What surrounds the content, as content.
         let whole: Vec<Vec<u8>> = seeds.iter().map(|seed| seed.pack(&seed.bytes)).collect();
         seeds.extend(whole.into_iter().map(plain));
@@ -134,6 +151,54 @@ fn ply() -> Vec<Vec<u8>> {
             vec![3, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 2],
         ]
         .concat(),
+    ]
+}
+
+/// A tetrahedron.
+const SOLID: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+const SOLID_CORNERS: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+const SOLID_FACES: [[u8; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+
+fn corners() -> Vec<u8> {
+    npy_file(
+        "<f4",
+        "False",
+        "(4, 3)",
+        &SOLID_CORNERS.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>(),
+    )
+}
+
+fn triangles() -> Vec<u8> {
+    npy_file("|u1", "False", "(4, 3)", SOLID_FACES.as_flattened())
+}
+
+fn mesh_ply() -> Vec<Vec<u8>> {
+    let head = |format: &str, kind: &str, normals: &str, list: &str| {
+        let axes = ["x", "y", "z"].map(|axis| format!("property {kind} {axis}\n")).concat();
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex 4\n{axes}{normals}element face 4\nproperty list {list} vertex_indices\nend_header\n"
+        )
+    };
+    let normals = ["nx", "ny", "nz"].map(|axis| format!("property float {axis}\n")).concat();
+    let text = |more: &str| {
+        let corners = SOLID_CORNERS.map(|[x, y, z]| format!("{x} {y} {z}{more}\n")).concat();
+        corners + &SOLID_FACES.map(|[a, b, c]| format!("3 {a} {b} {c}\n")).concat()
+    };
+    let data = |float: fn(&f32) -> [u8; 4], int: fn(i32) -> [u8; 4]| {
+        let corners = SOLID_CORNERS.as_flattened().iter().flat_map(float);
+        let faces = SOLID_FACES.iter().flat_map(|f| [vec![3], f.map(|i| int(i.into())).concat()].concat());
+        corners.chain(faces).collect::<Vec<u8>>()
+    };
+    vec![
+        (head("ascii", "double", "", "uchar int") + &text("")).into_bytes(),
+        (head("ascii", "float", &normals, "uint uchar") + &text(" 0 0 1")).into_bytes(),
+        [
+            head("binary_little_endian", "float", "", "uchar uint").into_bytes(),
+            data(|v| v.to_le_bytes(), i32::to_le_bytes),
+        ]
+        .concat(),
+        [head("binary_big_endian", "float", "", "uchar int").into_bytes(), data(|v| v.to_be_bytes(), i32::to_be_bytes)]
+            .concat(),
     ]
 }
 
@@ -197,11 +262,13 @@ fn bgeo(attribute: &[u8], words: usize) -> Vec<u8> {
     content
 }
 
+fn npy_file(descr: &str, fortran: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let header = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}\n");
+    [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), data].concat()
+}
+
 fn npy() -> Vec<Vec<u8>> {
-    let file = |descr: &str, fortran: &str, shape: &str, data: Vec<u8>| {
-        let header = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}\n");
-        [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), &data].concat()
-    };
+    let file = |descr: &str, fortran: &str, shape: &str, data: Vec<u8>| npy_file(descr, fortran, shape, &data);
     vec![
         file("<f4", "False", "(3, 3)", packed(f32::to_le_bytes)),
         file(">f8", "True", "(3, 3)", packed(|v| f64::from(v).to_be_bytes())),

@@ -253,6 +253,12 @@ pub(crate) fn read_triples(name: &Path, bytes: &[u8], wanted: &[&str], budget: &
     guarded(name, bytes, budget, |source| numpy::read_triples(source, wanted))
 }
 
+/// Refuses a PLY file's content whose header is none or promises more than follows; for readers of meshes.
+#[cfg(feature = "study")]
+pub(crate) fn check_ply_header(name: &Path, bytes: &[u8], budget: &Budget) -> Result<(), ReadError> {
+    guarded(name, bytes, budget, ply::check_header)
+}
+
 /// Shape and values of a NumPy array's content (.npy) in C order, whatever it is of.
 ///
 /// # Errors

@@ -5,13 +5,13 @@ use crate::io::{
     Budget,
     budget::OverBudget,
     guard,
-    particles::{ReadError, read_triples},
+    particles::{ReadError, check_ply_header, read_triples},
     quote,
 };
 use glam::{DVec3, Vec3};
 use npyz::WriterBuilder;
 use ply_rs_bw::{
-    parser::{Parser, Reader},
+    parser::{Parser as PlyParser, Reader},
     ply::{PropertyAccess, PropertyAccessResult},
 };
 use std::{
@@ -33,7 +33,13 @@ pub enum MeshFileError {
     /// Damaged, or not what its extension says.
     #[error("{}: {}; export the mesh again", quote::path(path), quote::cut(detail, 200))]
     Malformed { path: PathBuf, detail: String },
-    /// An archive that is damaged.
+    /// What a library's reader has not foreseen: a defect of it, or ours.
+    #[error(
+        "{}: reading it failed unforeseen; export the mesh again, from another program if need be",
+        quote::path(path)
+    )]
+    Panicked { path: PathBuf, panic: String },
+    /// An archive or a header that is damaged.
     #[error(transparent)]
     Archive(#[from] ReadError),
     /// An archive without what a mesh is made of.
@@ -50,24 +56,57 @@ pub enum MeshFileError {
 /// [`MeshFileError`], with the file's name. Whether rays can tell its inside is for [`Mesh::check`] to say.
 pub fn read(path: &Path, budget: &Budget) -> Result<Mesh, MeshFileError> {
     let io = |source| MeshFileError::Io { path: path.into(), source };
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let parse: fn(&[u8]) -> Result<Mesh, String> = match extension.as_deref() {
-        Some("ply") => ply,
-        Some("obj") => obj,
-        Some("npz") => return npz(path, &fs::read(path).map_err(io)?, budget),
-        _ => return Err(MeshFileError::Extension(path.into())),
+    parser(path)?;
+    check_size(path, fs::metadata(path).map_err(io)?.len(), budget)?;
+    from_bytes(path, &fs::read(path).map_err(io)?, budget)
+}
+
+/// Reads a mesh's content as [`read`] does; the extension of `path` says of what format it is.
+///
+/// # Errors
+/// As [`read`].
+pub fn from_bytes(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Mesh, MeshFileError> {
+    let parse = match parser(path)? {
+        Parser::Archive => return npz(path, bytes, budget),
+        Parser::Ply => {
+            // Its crate believes counts.
+            check_ply_header(path, bytes, budget)?;
+            ply
+        }
+        Parser::Obj => obj,
     };
-    let size = fs::metadata(path).map_err(io)?.len();
-    // A line of text or a packed face takes at most so many times its size.
-    let needed = size.saturating_mul(16);
-    if needed > budget.bytes() {
-        let source =
-            OverBudget { what: "the mesh".into(), needed, allowed: budget.bytes(), file: size, budget: *budget };
-        return Err(MeshFileError::TooLarge { path: path.into(), source });
-    }
-    let bytes = fs::read(path).map_err(io)?;
-    let parsed = guard::quietly(|| parse(&bytes)).unwrap_or_else(|_| Err("reading it failed unforeseen".into()));
+    check_size(path, bytes.len() as u64, budget)?;
+    let parsed =
+        guard::quietly(|| parse(bytes)).map_err(|panic| MeshFileError::Panicked { path: path.into(), panic })?;
     parsed.map_err(|detail| MeshFileError::Malformed { path: path.into(), detail })
+}
+
+#[derive(Clone, Copy)]
+enum Parser {
+    Ply,
+    Obj,
+    Archive,
+}
+
+fn parser(path: &Path) -> Result<Parser, MeshFileError> {
+    match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
+        Some("ply") => Ok(Parser::Ply),
+        Some("obj") => Ok(Parser::Obj),
+        Some("npz") => Ok(Parser::Archive),
+        _ => Err(MeshFileError::Extension(path.into())),
+    }
+}
+
+/// A line of text or a packed face takes at most so many times its size.
+const GROWTH: u64 = 16;
+
+fn check_size(path: &Path, file: u64, budget: &Budget) -> Result<(), MeshFileError> {
+    let needed = file.saturating_mul(GROWTH);
+    if needed <= budget.bytes() || matches!(parser(path)?, Parser::Archive) {
+        return Ok(());
+    }
+    let source = OverBudget { what: "the mesh".into(), needed, allowed: budget.bytes(), file, budget: *budget };
+    Err(MeshFileError::TooLarge { path: path.into(), source })
 }
 
 fn npz(path: &Path, bytes: &[u8], budget: &Budget) -> Result<Mesh, MeshFileError> {
@@ -142,7 +181,7 @@ impl PropertyAccess for Face {
 fn ply(bytes: &[u8]) -> Result<Mesh, String> {
     let mut reader = Reader::new(bytes);
     let said = |e: &dyn std::fmt::Display| e.to_string();
-    let parser = Parser::<Vertex>::new();
+    let parser = PlyParser::<Vertex>::new();
     let header = parser.read_header(&mut reader).map_err(|e| said(&e))?;
     let mut mesh = Mesh::default();
     for (name, element) in &header.elements {
@@ -154,7 +193,7 @@ fn ply(bytes: &[u8]) -> Result<Mesh, String> {
                 mesh.normals = normals.then(|| all.iter().map(|v| v.normal).collect());
             }
             "face" => {
-                let parser = Parser::<Face>::new();
+                let parser = PlyParser::<Face>::new();
                 let all = parser.read_payload_for_element(&mut reader, element, &header).map_err(|e| said(&e))?;
                 mesh.triangles = all.iter().flat_map(|f| fan(&f.0)).collect();
             }
@@ -170,7 +209,25 @@ fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
     corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
 }
 
+/// Refuses elements that name what no file of this size has: its crate multiplies indices before it looks.
+fn check_indices(bytes: &[u8]) -> Result<(), String> {
+    for (i, line) in bytes.split(|b| *b == b'\n').enumerate() {
+        let line = line.trim_ascii();
+        if !matches!(line.first(), Some(b'f' | b'l' | b'p')) {
+            continue;
+        }
+        let words = line.split(|b| b.is_ascii_whitespace() || *b == b'/').filter_map(|w| str::from_utf8(w).ok());
+        // What is no number at all the crate refuses.
+        let far = |index: &i128| index.unsigned_abs() > bytes.len() as u128;
+        if let Some(index) = words.filter_map(|w| w.parse::<i128>().ok()).find(far) {
+            return Err(format!("line {} names number {index}, and there are not so many", i + 1));
+        }
+    }
+    Ok(())
+}
+
 fn obj(bytes: &[u8]) -> Result<Mesh, String> {
+    check_indices(bytes)?;
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
     let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials).map_err(|e| e.to_string())?;

@@ -60,8 +60,7 @@ pub struct MeshSurface {
 }
 
 struct Triangle {
-    corner: DVec3,
-    edges: [DVec3; 2],
+    corners: [DVec3; 3],
     normal: DVec3,
     /// At the corners.
     normals: Option<[DVec3; 3]>,
@@ -73,17 +72,45 @@ const REACH: f64 = 512.0;
 /// twenty times the distance along a ray up to which the hierarchy passes over boxes.
 const MARGIN: f32 = 2e-3;
 
+/// A ray as triangles are met by it: seen along it, from where it starts (Woop et al. 2013, *Watertight Ray/Triangle Intersection*).
+struct Sight {
+    origin: DVec3,
+    /// The other axes, and the one that the ray runs along most.
+    axes: [usize; 3],
+    /// How far it goes along the other axes for each unit along that one.
+    shear: [f64; 2],
+    /// Its length for each unit along that one.
+    stretch: f64,
+}
+
+impl Sight {
+    fn new(ray: &Ray) -> Sight {
+        let most = ray.dir.abs().max_position();
+        let axes = [(most + 1) % 3, (most + 2) % 3, most];
+        let [x, y, z] = axes.map(|axis| ray.dir[axis]);
+        Sight { origin: ray.origin, axes, shear: [x / z, y / z], stretch: 1.0 / z }
+    }
+
+    /// How far beside the ray a point lies on either side, and how far along it.
+    fn of(&self, point: DVec3) -> [f64; 3] {
+        let [x, y, z] = self.axes.map(|axis| point[axis] - self.origin[axis]);
+        [x - self.shear[0] * z, y - self.shear[1] * z, self.stretch * z]
+    }
+}
+
 impl Triangle {
-    /// Distance along a ray, and the weights of the second and third corner (Möller and Trumbore 1997).
-    fn meets(&self, ray: &Ray) -> Option<(f64, f64, f64)> {
-        let [a, b] = self.edges;
-        let p = ray.dir.cross(b);
-        let det = a.dot(p);
-        let s = ray.origin - self.corner;
-        let q = s.cross(a);
-        let (u, v, t) = (s.dot(p) / det, ray.dir.dot(q) / det, b.dot(q) / det);
-        // A ray within the triangle's plane gives infinities or no numbers, and meets nothing.
-        (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= 0.0 && t.is_finite()).then_some((t, u, v))
+    /// Distance along a ray, and the weights of the second and third corner. Two triangles round the same about the edge that they
+    /// share, so that no ray gets through between them.
+    fn meets(&self, sight: &Sight) -> Option<(f64, f64, f64)> {
+        let [a, b, c] = self.corners.map(|corner| sight.of(corner));
+        let weights = [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]];
+        if weights.iter().any(|w| *w < 0.0) && weights.iter().any(|w| *w > 0.0) {
+            return None;
+        }
+        // A ray within the triangle's plane sees it as a line: it has no weights, and is not met.
+        let [u, v, w] = weights.map(|w| w / weights.iter().sum::<f64>());
+        let t = u * a[2] + v * b[2] + w * c[2];
+        (t >= 0.0 && t.is_finite()).then_some((t, v, w))
     }
 }
 
@@ -97,8 +124,7 @@ impl MeshSurface {
         let boxes: Vec<Aabb> = triangles
             .iter()
             .map(|t| {
-                let corners = [t.corner, t.corner + t.edges[0], t.corner + t.edges[1]];
-                let corners = corners.map(|c| Vec3A::from(((c - middle) * scale).as_vec3()));
+                let corners = t.corners.map(|c| Vec3A::from(((c - middle) * scale).as_vec3()));
                 let tight = Aabb::from_points(&corners);
                 Aabb::new(tight.min - MARGIN, tight.max + MARGIN)
             })
@@ -119,11 +145,11 @@ impl MeshSurface {
 }
 
 fn triangle(mesh: &Mesh, corners: [u32; 3]) -> Option<Triangle> {
-    let [a, b, c] = corners.map(|i| mesh.vertices[i as usize]);
-    let edges = [b - a, c - a];
-    let normal = edges[0].cross(edges[1]).try_normalize()?;
     let normals = mesh.normals.as_ref().map(|n| corners.map(|i| n[i as usize].as_dvec3()));
-    Some(Triangle { corner: a, edges, normal, normals })
+    let corners = corners.map(|i| mesh.vertices[i as usize]);
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    Some(Triangle { corners, normal, normals })
 }
 
 impl Surface for MeshSurface {
@@ -131,14 +157,18 @@ impl Surface for MeshSurface {
         // Far from the mesh single precision would be too coarse: rays start where they come into its box.
         let entry = self.entry(ray);
         let origin = (ray.at(entry) - self.middle) * self.scale;
-        let boxes = BoxRay::new_inf(Vec3A::from(origin.as_vec3()), Vec3A::from(ray.dir.as_vec3()));
+        // The hierarchy takes -0 for a way up whose inverse points down, and would find no box there.
+        let dir = Vec3A::from(ray.dir.as_vec3()) + Vec3A::ZERO;
+        let boxes = BoxRay::new_inf(Vec3A::from(origin.as_vec3()), dir);
+        let sight = Sight::new(ray);
         let mut nearest: Option<(f64, f64, f64, u32)> = None;
         self.bvh.ray_traverse(boxes, &mut RayHit::none(), |_, slot| {
             let id = slot as u32;
             if leaves == Some(id) {
                 return f32::INFINITY;
             }
-            if let Some((t, u, v)) = self.triangles[slot].meets(ray).filter(|(t, ..)| nearest.is_none_or(|n| *t < n.0))
+            if let Some((t, u, v)) =
+                self.triangles[slot].meets(&sight).filter(|(t, ..)| nearest.is_none_or(|n| *t < n.0))
             {
                 nearest = Some((t, u, v, id));
                 // Boxes that begin within the margin behind this hit are still looked into.

@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::numbers::Kind;
-use super::ply_header::{self, Element, Encoding, Property};
+use super::ply_header::{self, Element, Encoding, Header, Property};
 use super::source::Source;
 use super::{At, ParticleFile, ReadError, text};
 use crate::io::quote::{list, quote};
@@ -23,16 +23,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     };
     let mut file = None;
     for element in &header.elements {
-        let (needed, follow) =
-            (element.count.saturating_mul(element.least_size(header.encoding)), source.bytes.len() - header.body);
-        if needed > follow as u64 + 1 || (element.count > 0 && element.properties.is_empty()) {
-            let detail = format!(
-                "element `{}` promises {} entries, at least {needed} bytes; {follow} follow",
-                quote(&element.name),
-                element.count,
-            );
-            return Err(source.malformed(At::Byte(header.body as u64), detail));
-        }
+        promised(source, &header, element)?;
         if element.name == "vertex" {
             file = Some(vertices(source, element, &mut body)?);
         } else {
@@ -42,6 +33,28 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     body.finish(source)?;
     let names = || format!("elements {}", list(header.elements.iter().map(|e| e.name.as_str())));
     file.ok_or_else(|| source.no_positions("an element `vertex` expected", names()))
+}
+
+/// Refuses an element that promises more than follows the header.
+fn promised(source: &Source<'_>, header: &Header, element: &Element) -> Result<(), ReadError> {
+    let (needed, follow) =
+        (element.count.saturating_mul(element.least_size(header.encoding)), source.bytes.len() - header.body);
+    if needed <= follow as u64 + 1 && (element.count == 0 || !element.properties.is_empty()) {
+        return Ok(());
+    }
+    let detail = format!(
+        "element `{}` promises {} entries, at least {needed} bytes; {follow} follow",
+        quote(&element.name),
+        element.count,
+    );
+    Err(source.malformed(At::Byte(header.body as u64), detail))
+}
+
+/// Refuses a header that is none, or promises more than follows it: for readers of what is no particle.
+#[cfg(feature = "study")]
+pub(super) fn check_header(source: &Source<'_>) -> Result<(), ReadError> {
+    let header = ply_header::read(source)?;
+    header.elements.iter().try_for_each(|element| promised(source, &header, element))
 }
 
 fn vertices(source: &Source<'_>, element: &Element, body: &mut Body<'_>) -> Result<ParticleFile, ReadError> {

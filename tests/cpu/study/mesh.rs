@@ -12,7 +12,10 @@ use meniscus::{
         tracer::Tracer,
     },
 };
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 fn direction(random: &mut Random) -> DVec3 {
     loop {
@@ -65,6 +68,43 @@ fn the_hierarchy_misses_nothing() {
         }
         assert!(met > 1500 && inside > 900, "{met} {inside}");
     }
+}
+
+/// Along an axis as any other way, whatever the signs of its zeros, and between triangles and through corners too.
+#[test]
+fn rays_along_axes_meet_what_others_meet() {
+    let mesh = ball(DVec3::ZERO, 1.0, 12);
+    let surface = MeshSurface::new(&mesh);
+    let place = |i: &u32| mesh.vertices[*i as usize];
+    // Every corner, the middle of every edge, and a lattice.
+    let mut through = mesh.vertices.clone();
+    through.extend(mesh.triangles.iter().map(|[a, b, _]| 0.5 * (place(a) + place(b))));
+    through.extend(
+        (0..17 * 17 * 17).map(|i| DVec3::new((i % 17).into(), (i / 17 % 17).into(), (i / 289).into()) / 8.0 - 1.0),
+    );
+    let zeros = [[0.0, 0.0], [-0.0, 0.0], [0.0, -0.0], [-0.0, -0.0], [-1e-60, 1e-60]];
+    let mut met = 0;
+    for (axis, sign, zeros) in (0..6).flat_map(|i| zeros.map(|z| (i / 2, 1.0 - f64::from(i as u8 % 2) * 2.0, z))) {
+        let mut dir = DVec3::ZERO;
+        (dir[axis], dir[(axis + 1) % 3], dir[(axis + 2) % 3]) = (sign, zeros[0], zeros[1]);
+        for point in &through {
+            let mut across = *point;
+            across[axis] = 0.0;
+            // All triangles lie between two balls.
+            let half = [0.96f64, 1.0].map(|radius| (radius * radius - across.length_squared()).max(0.0).sqrt());
+            if half[0] == 0.0 {
+                continue;
+            }
+            for start in [-3.0, 0.0] {
+                let hit = surface.hit(&Ray { origin: across + start * sign * DVec3::AXES[axis], dir }, None);
+                let t = hit.unwrap_or_else(|| panic!("along {dir} through {point} nothing is met")).t + start;
+                let [least, most] = half.map(|h| if start < 0.0 { -h } else { h });
+                assert!((least.min(most) - 1e-12..=least.max(most) + 1e-12).contains(&t), "{t}: {least} to {most}");
+                met += 1;
+            }
+        }
+    }
+    assert!(met > 100_000, "{met}");
 }
 
 /// A fine mesh with a ball's normals bends light as the ball does; without normals facets show.
@@ -165,6 +205,13 @@ fn mesh_files_give_the_mesh() {
         let said = failed(file(name, content.as_bytes())).to_string();
         assert!(said.contains(name) && said.contains("export"), "{said}");
     }
+    let far =
+        fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/obj_far_index.mesh-obj")).expect("kept");
+    let said = failed(file("far.obj", &far)).to_string();
+    assert!(said.contains("far.obj: line 6 names number 9223372036854775807"), "{said}");
+    let lie = header.replace("vertex 4", "vertex 4000000000");
+    let said = failed(file("lie.ply", lie.as_bytes())).to_string();
+    assert!(said.contains("lie.ply") && said.contains("promises 4000000000 entries"), "{said}");
     let negative = (header.to_owned() + body).replace("3 1 3 2", "3 -1 3 2");
     let mesh = read(&file("neg.ply", negative.as_bytes()), &budget).expect("read");
     assert!(matches!(mesh.check(), Err(MeshError::Corner { triangle: 3, .. })));
