@@ -24,9 +24,14 @@ pub struct First {
 
 /// Row by row.
 pub fn maps(tracer: &Tracer) -> Vec<First> {
+    maps_at(tracer, DVec2::splat(0.5))
+}
+
+/// The same at another place within each pixel, from its upper left corner.
+pub fn maps_at(tracer: &Tracer, within: DVec2) -> Vec<First> {
     let [width, height] = tracer.view.size;
-    let center = |i: u64| DVec2::new((i % u64::from(width)) as f64 + 0.5, (i / u64::from(width)) as f64 + 0.5);
-    (0..u64::from(width) * u64::from(height)).into_par_iter().map(|i| first(tracer, center(i))).collect()
+    let corner = |i: u64| DVec2::new((i % u64::from(width)) as f64, (i / u64::from(width)) as f64);
+    (0..u64::from(width) * u64::from(height)).into_par_iter().map(|i| first(tracer, corner(i) + within)).collect()
 }
 
 fn first(tracer: &Tracer, point: DVec2) -> First {

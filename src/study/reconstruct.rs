@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use splashsurf_lib::{
     Parameters, nalgebra::Vector3, postprocessing as post, reconstruct_surface, sph_interpolation::SphInterpolator,
 };
+use std::{fmt, str::FromStr};
 
 /// How far a particle's kernel reaches, in units of twice its radius.
 pub const SMOOTHING_LENGTH: f32 = 2.0;
@@ -38,6 +39,37 @@ pub enum ReconstructError {
     /// Particles so thin that no surface is anywhere.
     #[error("no surface: the density is below {THRESHOLD} of a filled body's everywhere. Use a larger --radius")]
     NoSurface,
+}
+
+/// How a surface is made of particles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reconstruction {
+    /// By splashsurf, smoothed so many times.
+    Smoothed(u32),
+    /// Marching cubes of our own density field ([`super::isosurface`]).
+    Isosurface,
+}
+
+/// The word for it.
+const ISOSURFACE: &str = "isosurface";
+
+impl FromStr for Reconstruction {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Reconstruction, String> {
+        let passes = || text.parse().ok().filter(|n| *n <= 1000).map(Reconstruction::Smoothed);
+        let known = if text == ISOSURFACE { Some(Reconstruction::Isosurface) } else { passes() };
+        known.ok_or_else(|| format!("use smoothing passes, 0 to 1000, or {ISOSURFACE}"))
+    }
+}
+
+impl fmt::Display for Reconstruction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Reconstruction::Smoothed(passes) => write!(f, "{passes} smoothing passes"),
+            Reconstruction::Isosurface => write!(f, "our field's isosurface"),
+        }
+    }
 }
 
 /// A mesh around particles; positions and radius in world units, `passes` of smoothing.

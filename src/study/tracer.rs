@@ -88,7 +88,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// What remains after a length inside the liquid; an endless one leaves only what is not absorbed at all.
-    fn transmitted(&self, length: f64) -> DVec3 {
+    pub(super) fn transmitted(&self, length: f64) -> DVec3 {
         DVec3::from_array(self.absorption.to_array().map(|a| if a > 0.0 { (-a * length).exp() } else { 1.0 }))
     }
 

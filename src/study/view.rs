@@ -14,7 +14,7 @@ pub struct View<'a> {
     scale: DVec2,
     origin: DVec2,
     to_environment: DMat3,
-    map: &'a Equirect,
+    pub(super) map: &'a Equirect,
 }
 
 impl<'a> View<'a> {

@@ -4,6 +4,8 @@ mod access;
 mod analytic;
 mod background;
 mod behind;
+#[cfg(feature = "study")]
+mod built_field;
 mod classes;
 mod compact;
 mod cull;

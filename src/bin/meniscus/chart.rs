@@ -22,7 +22,11 @@ use meniscus::{
     Settings,
     host::{Gpu, Instance, Session},
     io::images,
-    study::{front::front, measures, reconstruct::SMOOTHING_PASSES},
+    study::{
+        front::front,
+        measures,
+        reconstruct::{Reconstruction, SMOOTHING_PASSES},
+    },
 };
 use points::{Point, Vary, Way};
 use std::{
@@ -45,16 +49,20 @@ pub struct Args {
     /// Methods that are drawn; the scene's own if none is named
     #[arg(long, value_name = "PRESET,...", value_delimiter = ',', conflicts_with = "method", value_parser = choices::presets())]
     pub methods: Vec<String>,
-    /// Each method that has it also with other values of a parameter or a family, one at a time: window=5,9,13 iterations=0..5
-    /// optics=one,two (a range has both its ends)
+    /// Each method that has it also with other values of a parameter or a family, in all combinations with each other and with the
+    /// method's own: window=5,9,13 iterations=0..5 optics=one,two (a range has both its ends)
     #[arg(long, value_name = "NAME=VALUES", num_args = 1..)]
     pub vary: Vec<Vary>,
+    /// Only one thing at a time has another value
+    #[arg(long, requires = "vary")]
+    pub one_at_a_time: bool,
     /// Samples a pixel of the truth, a multiple of 16 and at least 32
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = truth::samples)]
     pub samples: u32,
-    /// Smoothing passes of other surfaces of the same particles: how far their pictures are from the truth is its width
-    #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "0,5,15")]
-    pub truth_width: Vec<u32>,
+    /// Other surfaces of the same particles, by their smoothing passes, or the isosurface of our own density field: how far their
+    /// pictures are from the truth is its width
+    #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "0,5,15,isosurface")]
+    pub truth_width: Vec<Reconstruction>,
     /// Frames that are measured whenever a method has its turn, after one that is not
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub frames: u32,
@@ -76,8 +84,8 @@ pub struct Charted {
     pub mesh: String,
     /// The truth's picture in the store.
     pub truth_key: String,
-    /// Smoothing passes of other surfaces, and their pictures' FLIP over the liquid.
-    pub width: Vec<(u32, f64)>,
+    /// Other surfaces of the same particles, and their pictures' FLIP over the liquid.
+    pub width: Vec<(Reconstruction, f64)>,
     pub points: Vec<(String, Point)>,
     /// Of the points, by rising time.
     pub front: Vec<usize>,
@@ -168,7 +176,7 @@ impl Args {
 
     /// All ways to draw a scene.
     fn ways(&self, picture: &Picture) -> Result<Vec<Way>, Box<dyn Error>> {
-        Ok(points::ways(&self.methods(picture)?, &self.vary)?)
+        Ok(points::ways(&self.methods(picture)?, &self.vary, !self.one_at_a_time)?)
     }
 
     /// The methods' settings in a scene.
@@ -193,14 +201,15 @@ impl Args {
     ) -> Result<Charted, Box<dyn Error>> {
         let scene = picture.load(picture.particles.as_deref(), picture.preparer())?;
         terminal::progress(format!("{name}: {} particles, {} ways to draw them", scene.positions.len(), ways.len()));
-        let traced = |passes| truth::of_scene(picture, &scene, passes, self.samples, cache);
-        let truth = traced(SMOOTHING_PASSES)?;
+        let traced = |how| truth::of_scene(picture, &scene, how, self.samples, cache);
+        let own = Reconstruction::Smoothed(SMOOTHING_PASSES);
+        let truth = traced(own)?;
         let path = store.picture(&truth.key);
         outputs::write(&path, &images::encode_picture(&path, truth.picture.size, &truth.picture.pixels)?)?;
         let apart = |other: Truth| measures::compare(&truth.picture, &other.picture)?.means(Some(&truth.liquid()));
         let mut width = Vec::new();
-        for passes in self.truth_width.iter().filter(|p| **p != SMOOTHING_PASSES) {
-            width.push((*passes, apart(traced(*passes)?)?.flip));
+        for other in self.truth_width.iter().filter(|other| **other != own) {
+            width.push((*other, apart(traced(*other)?)?.flip));
         }
         let mut session = Session::new(gpu, picture.rendered_size()?, &picture.environment()?)?;
         let (frames, rounds) = (self.frames, self.rounds);
@@ -228,26 +237,28 @@ impl Args {
 fn csv(all: &[Charted]) -> String {
     let mut text = "scene,method,varied,value,ms_median,ms_p5,ms_p95,frames,memory_bytes,flip_liquid,flip_hdr_liquid,\
                     relative_mse_liquid,ssim_liquid,flip_picture,on_front,within_truth_width,truth_width_flip,surface_iou,surface_depth_r,\
-                    surface_depth_abs_r,surface_normal_degrees\n"
+                    surface_depth_abs_r,surface_normal_degrees,light_model_flip_liquid,light_model_relative_mse_liquid,\
+                    search_missed_percent,search_angle_degrees\n"
         .to_owned();
     let quoted =
         |s: &str| if s.contains([',', '"', '\n']) { format!("\"{}\"", s.replace('"', "\"\"")) } else { s.to_owned() };
     for one in all {
         for (i, (_, p)) in one.points.iter().enumerate() {
-            let (name, value) = p.varied.clone().unwrap_or_default();
+            let (name, value): (Vec<_>, Vec<_>) = p.varied.iter().cloned().unzip();
             let [median, low, high] = times(p);
             let hdr = p.liquid.flip_hdr.map_or(String::new(), |v| format!("{v:.6}"));
             let widest = one.widest().map_or(String::new(), |v| format!("{v:.6}"));
             let within = one.widest().map_or(String::new(), |v| (p.liquid.flip <= v).to_string());
-            let surface = p.surface_figures().map(|v| v.map_or(String::new(), |v| format!("{v:.5}")));
+            let figures = p.surface_figures().into_iter().chain(p.light_figures()).chain(p.search_figures());
+            let figures: Vec<_> = figures.map(|v| v.map_or(String::new(), |v| format!("{v:.5}"))).collect();
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
                 "{},{},{},{},{median:.4},{low:.4},{high:.4},{},{},{:.6},{hdr},{:.6e},{:.6},{:.6},{},{within},{widest},{}",
                 quoted(&one.name),
                 quoted(&p.method),
-                quoted(&name),
-                quoted(&value),
+                quoted(&name.join(" ")),
+                quoted(&value.join(" ")),
                 p.times().len(),
                 p.memory,
                 p.liquid.flip,
@@ -255,7 +266,7 @@ fn csv(all: &[Charted]) -> String {
                 p.liquid.ssim,
                 p.picture.flip,
                 one.front.contains(&i),
-                surface.join(","),
+                figures.join(","),
             );
         }
     }

@@ -23,7 +23,8 @@ use meniscus::{
         first::{self, First},
         measures::{self, Linear},
         mesh::Mesh,
-        mesh_file, reconstruct,
+        mesh_file,
+        reconstruct::{self, Reconstruction},
         surface::{MeshSurface, Surface},
         tracer::Tracer,
         view::View,
@@ -53,9 +54,12 @@ pub struct Args {
     #[arg(long, value_name = "NAME", conflicts_with = "file", long_help = analytic_help(),
         value_parser = PossibleValuesParser::new(analytic::SCENES.map(|s| s.0)))]
     pub analytic: Option<String>,
-    /// Passes that smooth the mesh made of the particles
+    /// Passes that smooth the mesh which splashsurf makes of the particles
     #[arg(long, value_name = "N", default_value_t = reconstruct::SMOOTHING_PASSES, value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub smoothing_passes: u32,
+    /// Make another mesh of the particles: marching cubes of the density field that `--layers field` has
+    #[arg(long, conflicts_with_all = ["mesh", "analytic", "smoothing_passes"])]
+    pub isosurface: bool,
     /// Samples a pixel, a multiple of 16 and at least 32
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = samples)]
     pub samples: u32,
@@ -128,25 +132,34 @@ pub struct Truth {
     pub mesh: String,
     /// Names the truth by all that decides it.
     pub key: String,
+    subject: Subject,
+    environment: Equirect,
 }
 
 impl Truth {
+    /// What `ask` finds out by rays in the scene.
+    pub fn trace<T>(&self, ask: impl FnOnce(&Tracer, &Camera) -> T) -> T {
+        let subject = &self.subject;
+        let view = View::new(&subject.camera, subject.picture.size, &self.environment);
+        ask(&Tracer::new(&*subject.surface, &view, &subject.liquid), &subject.camera)
+    }
+
     /// Where pixel centres meet liquid.
     pub fn liquid(&self) -> Vec<bool> {
         self.first.iter().map(|f| f.hits > 0).collect()
     }
 }
 
-/// The truth of particles whose mesh is smoothed so many times, traced or from the cache.
+/// The truth of particles whose mesh is made in some way, traced or from the cache.
 pub fn of_scene(
     picture: &Picture,
     scene: &Scene,
-    smoothing_passes: u32,
+    how: Reconstruction,
     samples: u32,
     cache: &Cache,
 ) -> Result<Truth, Box<dyn Error>> {
     let environment = environment(picture)?;
-    let mesh = cache.mesh_of(scene, smoothing_passes)?;
+    let mesh = cache.mesh_of(scene, how)?;
     mesh.check()?;
     let subject = Subject::of_mesh(picture.clone(), &scene.particles, scene.origin, mesh, Value::Null)?;
     let size = subject.picture.size;
@@ -155,12 +168,15 @@ pub fn of_scene(
     let key = cache::film_key(&subject, &environment, samples);
     let film = expose(&tracer, cache, &key, size, samples / PASS)?;
     let light = film.picture();
+    let first = first::maps(&tracer);
     Ok(Truth {
         noise: measures::relative_noise(&light, &film.variance()),
         picture: Linear { size, pixels: light.iter().map(|p| p.as_vec3().to_array()).collect() },
-        first: first::maps(&tracer),
+        first,
         mesh: subject.name.clone(),
         key,
+        subject,
+        environment,
     })
 }
 
@@ -240,11 +256,16 @@ impl Args {
             return Subject::of_mesh(picture, &scene.particles, scene.origin, mesh, record);
         }
         let scene = load(&picture)?;
-        let mesh = self.folders()?.mesh_of(&scene, self.smoothing_passes)?;
+        let how = match self.isosurface {
+            true => Reconstruction::Isosurface,
+            false => Reconstruction::Smoothed(self.smoothing_passes),
+        };
+        let mesh = self.folders()?.mesh_of(&scene, how)?;
         let source = picture.particles.as_deref().unwrap_or(Path::new("embedded dam break"));
         mesh.check().map_err(|e| named(&e, source))?;
         let mut record = mesh_record(&mesh, None);
-        record["smoothing_passes"] = json!(self.smoothing_passes);
+        record["reconstruction"] = json!(how.to_string());
+        record["smoothing_passes"] = json!((!self.isosurface).then_some(self.smoothing_passes));
         Subject::of_mesh(picture, &scene.particles, scene.origin, mesh, record)
     }
 

@@ -19,7 +19,7 @@ use crate::{
 use meniscus::{
     PRESETS, Settings,
     host::{Gpu, Instance, Session},
-    study::reconstruct::SMOOTHING_PASSES,
+    study::reconstruct::{Reconstruction, SMOOTHING_PASSES},
 };
 use std::{error::Error, path::PathBuf, process::ExitCode};
 
@@ -125,7 +125,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let on_device = on(&device);
     let gpu = Gpu::new(&instance, device).map_err(|e| on_device(e.into()))?;
     let scene = picture.load(picture.particles.as_deref(), picture.preparer())?;
-    let truth = truth::of_scene(&picture, &scene, SMOOTHING_PASSES, args.samples, &cache)?;
+    let truth = truth::of_scene(&picture, &scene, Reconstruction::Smoothed(SMOOTHING_PASSES), args.samples, &cache)?;
     let size = picture.rendered_size()?;
     let mut session = Session::new(&gpu, size, &picture.environment()?).map_err(|e| on_device(e.into()))?;
     let name =
@@ -185,7 +185,7 @@ impl Args {
                 start.push((preset.name.to_owned(), settings));
             }
         }
-        let mut ways = points::ways(&start, &[])?;
+        let mut ways = points::ways(&start, &[], false)?;
         let mut expanded: Vec<Settings> = Vec::new();
         loop {
             ways.truncate(self.most as usize);
@@ -217,7 +217,7 @@ fn neighbours(way: &Way) -> Result<Vec<Way>, Box<dyn Error>> {
         let vary: Vary = text.parse()?;
         let family = way.settings.method.members().iter().any(|(f, _)| *f == vary.name);
         if family || way.settings.parameters().iter().any(|p| p.name == vary.name) {
-            all.extend(points::ways(&base, &[vary])?.into_iter().skip(1));
+            all.extend(points::ways(&base, &[vary], false)?.into_iter().skip(1));
         }
     }
     Ok(all)

@@ -1,10 +1,10 @@
 //! Surfaces seen at an angle.
 
 use super::{
-    Case, Measure, NO_NUMBER, Rig, Step, StressError, clouds,
+    Case, Measure, NO_NUMBER, Rig, Step, StressError, clouds, degrees,
     exact::Shape,
     median, percent, quantile,
-    shot::{Shot, View, degrees},
+    shot::{Shot, View},
 };
 use crate::{Settings, inspect::Walk};
 use glam::DVec3;

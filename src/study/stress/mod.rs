@@ -14,7 +14,8 @@ mod search;
 mod shot;
 mod volumes;
 
-use crate::{Settings, host::HostError, prepare::PrepareError};
+pub(crate) use super::search::degrees;
+use crate::{Settings, host::HostError, prepare::PrepareError, study::reconstruct::ReconstructError};
 pub use shot::Rig;
 
 /// Why a case could not be run.
@@ -23,6 +24,9 @@ pub enum StressError {
     /// The device or the renderer refused.
     #[error(transparent)]
     Host(#[from] HostError),
+    /// The case's own particles have no surface.
+    #[error(transparent)]
+    Reconstruct(#[from] ReconstructError),
     /// The case's own particles could not be prepared.
     #[error(transparent)]
     Prepare(#[from] PrepareError),
@@ -33,7 +37,7 @@ pub enum StressError {
 pub struct Measure {
     /// What it is, with its unit.
     pub name: &'static str,
-    /// What a sound method stays within: at most this.
+    /// What a sound method stays within: at most this. Of a figure that is shown beside others, infinite.
     pub bound: f64,
     /// What it means to be beyond.
     pub beyond: &'static str,
@@ -117,11 +121,13 @@ pub const CASES: &[Case] = &[
     motion::ORBIT,
     motion::DRIFT,
     search::SEARCH,
+    search::RESIDUALS,
 ];
 
 impl Case {
     /// Runs it with a method; `None` where the method has no figure that the case is about.
     pub fn run(&self, rig: &mut Rig, settings: &Settings, extent: Extent) -> Result<Vec<Step>, StressError> {
+        rig.extent = extent;
         let mut steps = (self.run)(rig, settings, &(self.steps)(extent))?;
         // A figure that is no number is the worst there can be.
         for found in steps.iter_mut().flat_map(|s| s.found.iter_mut().flatten()).filter(|f| f.is_nan()) {

@@ -1,10 +1,10 @@
 //! The same liquid, said in another way: nothing should change.
 
 use super::{
-    Case, Measure, NO_NUMBER, Step, clouds,
+    Case, Measure, NO_NUMBER, Step, clouds, degrees,
     exact::Shape,
     median,
-    shot::{Shot, View, apart, degrees},
+    shot::{Shot, View, apart},
 };
 use crate::{srgb::encode_srgb, study::random::Random};
 use glam::{DVec3, Vec3};

@@ -1,20 +1,11 @@
-//! The search for walls, on its own maps.
+//! The search for walls, in its own maps or field.
 
 use super::{
-    Case, Measure, NO_NUMBER, Step, median, percent,
-    shot::{View, degrees},
+    Case, Extent, Measure, NO_NUMBER, Rig, Step, StressError, median, percent,
+    shot::{Shot, View},
 };
-use crate::{
-    Ellipsoid, Equirect, Particles,
-    inspect::Walk,
-    study::random::Random,
-    twin::{
-        walk::walk,
-        walls::{Map, Maps},
-    },
-};
+use crate::{Ellipsoid, Equirect, Particles, Settings, study::random::Random};
 use glam::{DVec3, Mat3, Vec3};
-use rayon::prelude::*;
 
 /// Random ellipsoids: body, and splashes among them.
 fn random_cloud(seed: u64) -> Particles {
@@ -33,10 +24,21 @@ fn random_cloud(seed: u64) -> Particles {
     Particles { radius: 1.0, ellipsoids: ellipsoids.collect(), splash_count }
 }
 
+/// A random cloud, and how far walks through it end from where a search that misses nothing ends, in degrees.
+fn residuals(rig: &mut Rig, settings: &Settings, cloud: u64) -> Result<(Shot, Vec<f64>), StressError> {
+    let view = View::new(DVec3::new(2.0, 3.0, 18.0), DVec3::ZERO, DVec3::Y, 45.0);
+    let shot = rig.draw(&random_cloud(cloud), &view, settings)?;
+    // In a field that takes longer.
+    let every = if shot.walked.field.is_some() { 29 } else { 7 };
+    let chosen: Vec<usize> = (0..shot.picture.len()).step_by(every).collect();
+    let off = shot.walked.off(settings, &Equirect::procedural_sky(), &chosen);
+    Ok((shot, off))
+}
+
 /// Beside a search that misses nothing.
 pub const SEARCH: Case = Case {
     name: "search",
-    about: "random clouds: where walks end, beside a slow march and bisection in the same maps",
+    about: "random clouds: where walks end, beside a slow march and bisection in the same maps or field",
     x: "cloud",
     promised: true,
     measures: &[
@@ -51,27 +53,45 @@ pub const SEARCH: Case = Case {
     ],
     steps: |extent| extent.of(&[1.0], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
     run: |rig, settings, steps| {
-        let sky = Equirect::procedural_sky();
         let mut found = Vec::new();
         for &x in steps {
-            let view = View::new(DVec3::new(2.0, 3.0, 18.0), DVec3::ZERO, DVec3::Y, 45.0);
-            let shot = rig.draw(&random_cloud(x as u64), &view, settings)?;
-            let maps = shot.maps.each_ref().map(|class| class.each_ref().map(|(depth, normal)| Map { depth, normal }));
-            let maps = Maps { frame: &shot.frame, maps, scene: None };
-            // The slow march knows optics that follow rays through the maps of a class or two.
-            let rays =
-                Walk::of(&settings.method.optics).filter(|w| w.refractions == 1 || !maps.maps[1][1].depth.is_empty());
-            let chosen =
-                (0..shot.picture.len()).step_by(7).filter(|i| rays.is_some() && shot.covered(*i) == Some(true));
-            let chosen: Vec<usize> = chosen.collect();
-            let off = |i: &usize| {
-                let twin = walk(&maps, rays.as_ref()?, &sky, [i % shot.width(), i / shot.width()]);
-                shot.last_direction(*i).map(|d| degrees(d, twin.direction))
-            };
-            let off: Vec<f64> = chosen.par_iter().filter_map(off).collect();
+            let (shot, off) = residuals(rig, settings, x as u64)?;
             let beyond = |limit: f64| percent(off.iter().filter(|a| **a > limit).count(), off.len());
             let shares = [beyond(1.0), beyond(0.1)];
             found.push(Step { x, found: vec![Some(shot.no_number()), median(off), shares[0], shares[1]] });
+        }
+        Ok(found)
+    },
+};
+
+/// The same as a histogram.
+pub const RESIDUALS: Case = Case {
+    name: "residuals",
+    about: "the same of all clouds as a histogram: of each angle, how many walks end that far off, but further than the angle before",
+    x: "degrees off, at most",
+    promised: true,
+    measures: &[
+        NO_NUMBER,
+        Measure { name: "walks, %", bound: f64::INFINITY, beyond: "" },
+        Measure { name: "walks further off than a degree, %", bound: 6.0, beyond: "walls are missed" },
+    ],
+    steps: |_| vec![1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 180.0],
+    run: |rig, settings, steps| {
+        let clouds = if rig.extent == Extent::Small { 1 } else { 6 };
+        let (mut all, mut no_number) = (Vec::new(), 0.0);
+        for cloud in 1..=clouds {
+            let (shot, off) = residuals(rig, settings, cloud)?;
+            no_number += shot.no_number();
+            all.extend(off);
+        }
+        let below = |limit: f64| all.iter().filter(|a| **a <= limit).count();
+        let mut found = Vec::new();
+        for (i, &x) in steps.iter().enumerate() {
+            let before = if i == 0 { 0 } else { below(steps[i - 1]) };
+            // The rest, what is no number too, is in the last.
+            let up_to = if i + 1 == steps.len() { all.len() } else { below(x) };
+            let share = percent(up_to - before, all.len());
+            found.push(Step { x, found: vec![Some(no_number), share, share.filter(|_| x > 1.0)] });
         }
         Ok(found)
     },

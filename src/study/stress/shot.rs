@@ -1,15 +1,16 @@
 //! One frame of a case, and what it left behind.
 
-use super::StressError;
+use super::{Extent, StressError, motion::Moment};
 use crate::{
     Camera, Class, FrameInput, Particles, Point, Settings,
     host::{HostError, Session},
     inspect::{self, Inspection, Walk},
     layers::Layers,
     prepare::{self, Input, Options, PrepareError, prepare},
-    shader::{Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_SIDE_WALL},
+    shader::{OUTCOME_HIT, OUTCOME_SIDE_WALL},
     space::Space,
     srgb::encode_srgb,
+    study::search::Walked,
     twin::{
         normal::decode_normal,
         quadric::{pixel_ray, scale_offset},
@@ -17,10 +18,16 @@ use crate::{
 };
 use ash::vk;
 use glam::{DVec2, DVec3, Mat3, Vec3};
+use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Renders cases on a device.
 pub struct Rig<'a, 'b> {
     session: &'a mut Session<'b>,
+    /// How much of a sweep is asked for.
+    pub(super) extent: Extent,
+    /// Truths of frames that several methods are compared with, by what they are of.
+    pub(super) truths: HashMap<String, Moment>,
 }
 
 /// What is rendered.
@@ -56,13 +63,9 @@ pub struct Shot {
     /// method's surfaces have another size than the picture.
     pub front: Option<Vec<f64>>,
     /// Outward world normals there.
-    normals: Vec<u32>,
-    /// What walks met, four values a pixel, and where they went; empty without walks.
-    walks: Vec<f32>,
-    directions: Vec<f32>,
-    /// The maps that walks go through: by class and side, depths and normals.
-    pub maps: [[(Vec<f32>, Vec<u32>); 2]; 2],
-    pub frame: Frame,
+    normals: Vec<Option<DVec3>>,
+    /// What walks went through and met.
+    pub walked: Walked,
     from_eye: Mat3,
     eye: DVec3,
 }
@@ -70,7 +73,7 @@ pub struct Shot {
 impl<'a, 'b> Rig<'a, 'b> {
     /// On a session, whose environment is what is seen.
     pub fn new(session: &'a mut Session<'b>) -> Rig<'a, 'b> {
-        Rig { session }
+        Rig { session, extent: Extent::Full, truths: HashMap::new() }
     }
 
     /// A frame of particles of radius `radius` that the CPU prepares.
@@ -110,38 +113,19 @@ impl<'a, 'b> Rig<'a, 'b> {
         session.resize(view.size)?;
         let input = FrameInput::new(0, &view.camera, settings, vk::ImageView::null()).eye_inside(view.eye_inside);
         session.frame(&input)?;
-        let names = session.renderer.surfaces();
-        let mut read = |name: Option<&'static str>, side| -> Result<Vec<u32>, HostError> {
-            Ok(name.map(|n| session.words(n, side)).transpose()?.flatten().unwrap_or_default())
-        };
-        let floats = |words: Vec<u32>| -> Vec<f32> { words.into_iter().map(f32::from_bits).collect() };
-        let mut maps: [[(Vec<f32>, Vec<u32>); 2]; 2] = Default::default();
-        let named = [(names.splash_depth, names.splash_normal), (names.body_depth, names.body_normal)];
-        for (class, (depth, normal)) in named.into_iter().enumerate() {
-            for (side, map) in (0..).zip(&mut maps[class]) {
-                *map = (floats(read(depth, side)?), read(normal, side)?);
-            }
-        }
-        let met = floats(read(Some("walk (debug)").filter(|_| walks), 0)?);
-        let directions = floats(read(Some("final direction (debug)").filter(|_| walks), 0)?);
         let space = Space::of(particles);
         let bounds = particles.bounds().unwrap_or_default();
         let mut frame = inspect::uniforms(&view.camera, settings, view.size, &space, bounds);
         frame.eye_inside = f32::from(view.eye_inside);
         let from_eye = Mat3::from_mat4(view.camera.view).transpose();
         let eye = view.camera.view.as_dmat4().inverse().w_axis.truncate();
-        let mut shot = Shot {
-            picture: session.picture()?,
-            front: None,
-            normals: Vec::new(),
-            walks: met,
-            directions,
-            maps,
-            frame,
-            from_eye,
-            eye,
-        };
-        shot.take_front(space.radius);
+        let picture = session.picture()?;
+        let walked = Walked::read(session, frame, settings, particles)?;
+        let mut shot = Shot { picture, front: None, normals: Vec::new(), walked, from_eye, eye };
+        match shot.walked.field {
+            Some(_) => shot.take_field(),
+            None => shot.take_front(space.radius),
+        }
         Ok(shot)
     }
 }
@@ -162,25 +146,43 @@ impl Shot {
     /// The nearer of both classes' fronts.
     fn take_front(&mut self, radius: f64) {
         let count = self.picture.len();
-        let [splash, body] = self.maps.each_ref().map(|class| &class[0]);
+        let [splash, body] = self.walked.maps.each_ref().map(|class| &class[0]);
         if [splash, body].iter().any(|m| !m.0.is_empty() && m.0.len() != count) {
             return;
         }
-        let (mut front, mut normals) = (vec![0.0; count], vec![0; count]);
+        let (mut front, mut normals) = (vec![0.0; count], vec![None; count]);
         for i in 0..count {
             for (depth, normal) in [splash, body] {
                 let d = depth.get(i).map_or(0.0, |d| f64::from(*d) * radius);
                 if d != 0.0 && (front[i] == 0.0 || d < front[i]) {
-                    (front[i], normals[i]) = (d, normal.get(i).copied().unwrap_or(0));
+                    let code = normal.get(i).copied().filter(|n| *n != 0);
+                    let normal = code.map(|code| (self.from_eye * decode_normal(code)).as_dvec3());
+                    (front[i], normals[i]) = (d, normal);
                 }
             }
         }
         (self.front, self.normals) = (Some(front), normals);
     }
 
+    /// The field's front, and that of the balls beside it.
+    fn take_field(&mut self) {
+        let Some(field) = &self.walked.field else { return };
+        let near = f64::from(self.walked.frame.near) * field.radius();
+        let seen = |i: usize| {
+            let (eye, dir) = self.ray(i);
+            let per_depth = 1.0 / -self.view_ray(i).normalize().z;
+            if field.holds(eye + near * per_depth * dir) {
+                return (-near, None);
+            }
+            field.first(eye, dir).map_or((0.0, None), |(t, normal)| (t / per_depth, Some(normal)))
+        };
+        let all: (Vec<_>, Vec<_>) = (0..self.picture.len()).into_par_iter().map(seen).unzip();
+        (self.front, self.normals) = (Some(all.0), all.1);
+    }
+
     /// Width in pixels.
     pub fn width(&self) -> usize {
-        self.frame.size.x as usize
+        self.walked.frame.size.x as usize
     }
 
     /// The eye, and the unit direction of a pixel's ray, in the world.
@@ -191,15 +193,15 @@ impl Shot {
 
     /// The direction of a pixel's ray in eye space, of depth 1.
     fn view_ray(&self, i: usize) -> DVec3 {
-        pixel_ray(&self.frame, (i % self.width()) as u32, (i / self.width()) as u32)
+        pixel_ray(&self.walked.frame, (i % self.width()) as u32, (i / self.width()) as u32)
     }
 
     /// The pixel on which a point of the world lies, if it is in the view.
     pub fn pixel_of(&self, at: DVec3) -> Option<usize> {
         let x = self.from_eye.as_dmat3().transpose() * (at - self.eye);
-        let (scale, origin) = scale_offset(&self.frame);
+        let (scale, origin) = scale_offset(&self.walked.frame);
         let p = (scale * x.truncate() / -x.z + origin).floor();
-        let size = self.frame.size.as_dvec2();
+        let size = self.walked.frame.size.as_dvec2();
         let seen = x.z < 0.0 && p.cmpge(DVec2::ZERO).all() && p.cmplt(size).all();
         seen.then(|| p.y as usize * self.width() + p.x as usize)
     }
@@ -212,32 +214,26 @@ impl Shot {
 
     /// The front's outward normal, in the world.
     pub fn normal(&self, i: usize) -> Option<DVec3> {
-        let code = self.normals.get(i).copied().filter(|n| *n != 0)?;
-        Some((self.from_eye * decode_normal(code)).as_dvec3())
+        self.normals.get(i).copied().flatten()
     }
 
     /// Whether there is liquid at a pixel; `None` where the method does not say.
     pub fn covered(&self, i: usize) -> Option<bool> {
-        if !self.walks.is_empty() {
-            return Some(self.walks[4 * i + 1] as u32 != OUTCOME_NO_LIQUID);
+        if !self.walked.walks.is_empty() {
+            return Some(self.walked.met(i));
         }
         self.front.as_ref().map(|f| f[i] != 0.0)
     }
 
-    /// Where a walk went in the end, complete or not, in the world.
-    pub fn last_direction(&self, i: usize) -> Option<DVec3> {
-        self.directions.get(4 * i..4 * i + 3).map(|d| Vec3::from_slice(d).as_dvec3())
-    }
-
     /// Where a complete walk went, in the world.
     pub fn direction(&self, i: usize) -> Option<DVec3> {
-        let outcome = *self.walks.get(4 * i + 1)? as u32;
-        self.last_direction(i).filter(|_| outcome == OUTCOME_HIT || outcome == OUTCOME_SIDE_WALL)
+        let outcome = *self.walked.walks.get(4 * i + 1)? as u32;
+        self.walked.last_direction(i).filter(|_| outcome == OUTCOME_HIT || outcome == OUTCOME_SIDE_WALL)
     }
 
     /// What a walk met: pattern, outcome, walls, length inside.
     pub fn walk(&self, i: usize) -> Option<&[f32]> {
-        self.walks.get(4 * i..4 * i + 4)
+        self.walked.walks.get(4 * i..4 * i + 4)
     }
 
     /// Pixels with a value that is not finite.
@@ -245,7 +241,7 @@ impl Shot {
         let whole = |i: usize| {
             self.picture[i].iter().all(|v| v.is_finite())
                 && self.walk(i).is_none_or(|w| w.iter().all(|v| v.is_finite()))
-                && self.directions.get(4 * i..4 * i + 4).is_none_or(|d| d.iter().all(|v| v.is_finite()))
+                && self.walked.directions.get(4 * i..4 * i + 4).is_none_or(|d| d.iter().all(|v| v.is_finite()))
         };
         (0..self.picture.len()).filter(|i| !whole(*i)).count() as f64
     }
@@ -259,9 +255,4 @@ impl Shot {
 /// Largest difference of the three channels.
 pub fn apart(a: Vec3, b: Vec3) -> f64 {
     f64::from((a - b).abs().max_element())
-}
-
-/// Angle between two directions, in degrees.
-pub fn degrees(a: DVec3, b: DVec3) -> f64 {
-    a.cross(b).length().atan2(a.dot(b)).to_degrees()
 }

@@ -1,6 +1,7 @@
 //! The truth and the measures, against closed forms and independent implementations.
 
 mod film;
+mod light_model;
 mod measures;
 mod mesh;
 mod tracer;

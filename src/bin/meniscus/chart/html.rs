@@ -62,11 +62,11 @@ fn protocol(all: &[Charted], device: &str, args: &Args) -> String {
 }
 
 fn width(one: &Charted) -> String {
-    let each: Vec<_> = one.width.iter().map(|(passes, error)| format!("{error:.3} with {passes}")).collect();
+    let each: Vec<_> = one.width.iter().map(|(other, error)| format!("{error:.3} ({other})")).collect();
     let wide = if each.is_empty() { "not measured".into() } else { each.join(", ") };
     format!(
-        "<p>The truth: mesh {}, noise (relative MSE) {:.1e}. Its width, the FLIP of the same particles' surface smoothed another \
-         number of times: {wide}. What is within it is called that, not better.</p>\n",
+        "<p>The truth: mesh {}, noise (relative MSE) {:.1e}. Its width, the FLIP of other surfaces of the same particles: \
+         {wide}. What is within it is called that, not better.</p>\n",
         escaped(&one.mesh),
         one.noise
     )
@@ -75,7 +75,7 @@ fn width(one: &Charted) -> String {
 fn table(one: &Charted) -> String {
     let mut text = "<table><tr><th>way</th><th>ms</th><th>5 %</th><th>95 %</th><th>FLIP</th><th>HDR-FLIP</th><th>relative MSE</th>\
                     <th>SSIM</th><th>FLIP, picture</th><th>silhouette</th><th>depth, r</th><th>|depth|, r</th><th>normal, degrees</th>\
-                    <th>MB</th><th></th></tr>\n"
+                    <th>light model</th><th>search missed, %</th><th>off, degrees</th><th>MB</th><th></th></tr>\n"
         .to_owned();
     for (i, (_, p)) in one.points.iter().enumerate() {
         let [median, low, high] = times(p);
@@ -83,15 +83,16 @@ fn table(one: &Charted) -> String {
         let inside = one.widest().is_some_and(|w| p.liquid.flip <= w);
         let notes = [(front, "front"), (inside, "within the truth's width")];
         let notes: Vec<_> = notes.iter().filter(|n| n.0).map(|n| n.1).collect();
-        let digits = [3, 2, 2, 1];
-        let surface =
-            p.surface_figures().into_iter().zip(digits).map(|(v, n)| v.map_or("-".into(), |v| format!("{v:.n$}")));
-        let surface: String = surface.map(|v| format!("<td>{v}</td>")).collect();
+        let digits = [3, 2, 2, 1, 4, 1, 3];
+        let figures =
+            p.surface_figures().into_iter().chain(p.light_figures().into_iter().take(1)).chain(p.search_figures());
+        let figures = figures.zip(digits).map(|(v, n)| v.map_or("-".into(), |v| format!("{v:.n$}")));
+        let figures: String = figures.map(|v| format!("<td>{v}</td>")).collect();
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
             "<tr class=\"{}\"><td>{}</td><td>{median:.2}</td><td>{low:.2}</td><td>{high:.2}</td><td>{:.4}</td><td>{}</td><td>{:.3e}</td>\
-             <td>{:.4}</td><td>{:.4}</td>{surface}<td>{:.1}</td><td class=\"inside\">{}</td></tr>",
+             <td>{:.4}</td><td>{:.4}</td>{figures}<td>{:.1}</td><td class=\"inside\">{}</td></tr>",
             if front { "front" } else { "" },
             escaped(&p.name()),
             p.liquid.flip,
@@ -104,7 +105,9 @@ fn table(one: &Charted) -> String {
         );
     }
     text + "</table>\n<p class=\"note\">Of the method's own first surface against the truth's: IoU of the silhouettes; medians of the depth's \
-            error in particle radii (positive: behind), of its absolute value, and of the angle between normals.</p>\n"
+            error in particle radii (positive: behind), of its absolute value, and of the angle between normals. Light model: FLIP of \
+            the method's optics alone, traced exactly on the truth's surface. Search: how many of the walks end more than a degree \
+            from where an exact search in the method's own maps or field ends, and by how much in the median.</p>\n"
 }
 
 /// The pair of points of two methods that are nearest by `apart`; of one method's own where there is no other.

@@ -13,17 +13,26 @@ use crate::{
     truth::Truth,
 };
 use meniscus::{
-    Camera, FrameInput, Settings,
+    Equirect, FrameInput, Liquid, Settings,
     host::Session,
+    inspect::Inspection,
     io::images,
     layers::Layers,
+    optics::Optics,
     profile::FrameTimes,
-    study::measures::{self, Linear},
+    study::{
+        first, light_model,
+        measures::{self, Linear, Means},
+        search::Walked,
+    },
 };
 use std::error::Error;
 
 /// Frames that are drawn and not counted whenever another way has its turn.
 const WARM_UP: u32 = 1;
+/// Pixels at which walks are searched again, exactly; about as many in a field, where that takes longer.
+const SEARCHED: usize = 1500;
+const SEARCHED_IN_FIELD: usize = 250;
 
 /// What is measured, and against what.
 pub struct Job<'a> {
@@ -57,6 +66,7 @@ pub fn all(
     let bar = progress(u64::from(job.rounds) * ways.len() as u64, "measuring");
     bar.set_position(found.iter().map(visits).sum());
     bar.reset_eta();
+    let mut judge = Judge { job, store, sky: Equirect::procedural_sky(), light: Vec::new() };
     for round in 0..u64::from(job.rounds) {
         for ((way, key), point) in ways.iter().zip(&keys).zip(&mut found) {
             if visits(point) > round {
@@ -84,7 +94,7 @@ pub fn all(
             };
             let mut now = match point.take() {
                 Some(point) => point,
-                None => judge(job, way, key, store, &camera, session)?,
+                None => judge.point(way, key, &input, session)?,
             };
             now.visits.push(visit);
             store.keep(key, &now)?;
@@ -96,34 +106,76 @@ pub fn all(
     Ok(keys.into_iter().zip(found.into_iter().flatten()).collect())
 }
 
-/// The last frame's error against the truth, without times yet.
-fn judge(
-    job: &Job,
-    way: &Way,
-    key: &str,
-    store: &Store,
-    camera: &Camera,
-    session: &mut Session,
-) -> Result<Point, Box<dyn Error>> {
-    let size = job.picture.rendered_size()?;
-    let pixels = render::average(&session.picture()?, size, job.picture.supersample);
-    let picture = Linear { size: job.picture.size, pixels };
-    let maps = measures::compare(&job.truth.picture, &picture)?;
-    let path = store.picture(key);
-    outputs::write(&path, &images::encode_picture(&path, picture.size, &picture.pixels)?)?;
-    let path = store.error_map(key);
-    outputs::write(&path, &images::encode_srgb_png(&path, picture.size, &measures::magma(&maps.flip))?)?;
-    let radius = job.scene.particles.radius;
-    let fronts = surface::fronts(session, camera, radius, picture.size, job.picture.supersample)?;
-    Ok(Point {
-        scene: job.name.to_owned(),
-        method: way.method.clone(),
-        varied: way.varied.clone(),
-        settings: crate::choices::record(&way.settings),
-        memory: session.renderer.memory().iter().map(|e| e.bytes).sum(),
-        picture: maps.means(None)?,
-        liquid: maps.means(Some(&job.truth.liquid()))?,
-        surface: fronts.and_then(|seen| measures::surface::compare(&job.truth.first, &seen, radius)),
-        visits: Vec::new(),
-    })
+/// Tells how far pictures are from a scene's truth, and why.
+struct Judge<'a> {
+    job: &'a Job<'a>,
+    store: &'a Store,
+    sky: Equirect,
+    /// What each optics make of the truth's surface.
+    light: Vec<(Optics, Liquid, Option<Means>)>,
+}
+
+impl Judge<'_> {
+    /// The last frame's errors, without times yet; draws one more that says what walks met.
+    fn point(
+        &mut self,
+        way: &Way,
+        key: &str,
+        input: &FrameInput,
+        session: &mut Session,
+    ) -> Result<Point, Box<dyn Error>> {
+        let (job, store, times) = (self.job, self.store, self.job.picture.supersample);
+        let rendered = job.picture.rendered_size()?;
+        let pixels = render::average(&session.picture()?, rendered, times);
+        let picture = Linear { size: job.picture.size, pixels };
+        let maps = measures::compare(&job.truth.picture, &picture)?;
+        let path = store.picture(key);
+        outputs::write(&path, &images::encode_picture(&path, picture.size, &picture.pixels)?)?;
+        let path = store.error_map(key);
+        outputs::write(&path, &images::encode_srgb_png(&path, picture.size, &measures::magma(&maps.flip))?)?;
+        let memory = session.renderer.memory().iter().map(|e| e.bytes).sum();
+        session.renderer.inspect(Inspection { walks: true, ..Inspection::default() });
+        session.frame(input)?;
+        let frame = session.block()?;
+        let walked = Walked::read(session, frame, input.settings, &job.scene.particles)?;
+        session.renderer.inspect(Inspection::default());
+        let radius = job.scene.particles.radius;
+        let surface = surface::fronts(&walked, input.camera, radius, picture.size, times).and_then(|seen| {
+            let truth = job.truth.trace(|tracer, _| first::maps_at(tracer, surface::within(times)));
+            measures::surface::compare(&truth, &seen, radius)
+        });
+        let most = if walked.field.is_some() { SEARCHED_IN_FIELD } else { SEARCHED };
+        Ok(Point {
+            scene: job.name.to_owned(),
+            method: way.method.clone(),
+            varied: way.varied.clone(),
+            settings: crate::choices::record(&way.settings),
+            memory,
+            picture: maps.means(None)?,
+            liquid: maps.means(Some(&job.truth.liquid()))?,
+            surface,
+            light_model: self.light_model(input.settings)?,
+            search: walked.error(input.settings, &self.sky, most),
+            visits: Vec::new(),
+        })
+    }
+
+    /// Over the liquid; traced once for all methods with these optics.
+    fn light_model(&mut self, settings: &Settings) -> Result<Option<Means>, Box<dyn Error>> {
+        let (optics, liquid, truth) = (settings.method.optics, settings.liquid, self.job.truth);
+        if let Some(known) = self.light.iter().find(|l| (l.0, l.1) == (optics, liquid)) {
+            return Ok(known.2);
+        }
+        let radius = self.job.scene.particles.radius;
+        let seen =
+            truth.trace(|tracer, camera| light_model::picture(tracer, camera, settings, radius, light_model::EACH_WAY));
+        let means = seen.map(|pixels| -> Result<Means, Box<dyn Error>> {
+            let pixels = pixels.iter().map(|p| p.to_array()).collect();
+            let maps = measures::compare(&truth.picture, &Linear { size: truth.picture.size, pixels })?;
+            Ok(maps.means(Some(&truth.liquid()))?)
+        });
+        let means = means.transpose()?;
+        self.light.push((optics, liquid, means));
+        Ok(means)
+    }
 }

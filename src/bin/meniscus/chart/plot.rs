@@ -89,9 +89,9 @@ where
             .draw_series([band])?
             .label("truth's width")
             .legend(|(x, y)| Rectangle::new([(x, y - 5), (x + 16, y + 5)], RGBColor(225, 232, 240).filled()));
-        for (passes, error) in &one.width {
+        for (other, error) in &one.width {
             chart.draw_series([PathElement::new([(left, *error), (right, *error)], RGBColor(150, 165, 180))])?;
-            let name = format!("same particles, {passes} smoothing passes");
+            let name = format!("same particles, {other}");
             chart.draw_series([Text::new(
                 name,
                 (left * 1.01, *error),
@@ -118,7 +118,7 @@ where
         });
         chart.draw_series(spread)?;
         let dots = own.map(|((_, p), [ms, error])| {
-            Circle::new((*ms, *error), if p.varied.is_none() { 7 } else { 4 }, color.filled())
+            Circle::new((*ms, *error), if p.varied.is_empty() { 7 } else { 4 }, color.filled())
         });
         chart.draw_series(dots)?.label(method).legend(move |(x, y)| Circle::new((x + 8, y), 5, color.filled()));
     }

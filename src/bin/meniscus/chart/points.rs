@@ -1,9 +1,12 @@
-//! What a chart measures: each method as it is, and with one parameter varied at a time.
+//! What a chart measures: each method as it is, and with parameters varied, in all combinations or one at a time.
 
 use crate::choices;
 use meniscus::{
     Error, Settings,
-    study::measures::{Means, surface::SurfaceError},
+    study::{
+        measures::{Means, surface::SurfaceError},
+        search::SearchError,
+    },
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -48,60 +51,81 @@ impl FromStr for Vary {
 #[derive(Clone, Debug)]
 pub struct Way {
     pub method: String,
-    /// What is not as the method has it.
-    pub varied: Option<(String, String)>,
+    /// What is not as the method has it: names and values.
+    pub varied: Varied,
     pub settings: Settings,
 }
 
+pub type Varied = Vec<(String, String)>;
+
 impl Way {
     pub fn name(&self) -> String {
-        name(&self.method, self.varied.as_ref())
+        name(&self.method, &self.varied)
     }
 }
 
-fn name(method: &str, varied: Option<&(String, String)>) -> String {
-    varied.map_or_else(|| method.to_owned(), |(name, value)| format!("{method} {name}={value}"))
+fn name(method: &str, varied: &[(String, String)]) -> String {
+    varied.iter().fold(method.to_owned(), |all, (name, value)| format!("{all} {name}={value}"))
 }
 
-/// Every way: methods as they are, then each with one value after the other of each variation that it has. A value that is the
-/// method's own anyway is not drawn twice.
-pub fn ways(methods: &[(String, Settings)], vary: &[Vary]) -> Result<Vec<Way>, Error> {
+/// Every way: methods as they are, then each with values of the variations that it has, `combined` or one variation at a time. A value
+/// that is the method's own anyway is not drawn twice.
+pub fn ways(methods: &[(String, Settings)], vary: &[Vary], combined: bool) -> Result<Vec<Way>, Error> {
     let mut ways: Vec<Way> = Vec::new();
     for (method, settings) in methods {
-        ways.push(Way { method: method.clone(), varied: None, settings: *settings });
+        ways.push(Way { method: method.clone(), varied: Vec::new(), settings: *settings });
     }
-    for v in vary {
-        let family = settings_has_family(&v.name);
-        let has = |s: &Settings| family || s.parameters().iter().any(|p| p.name == v.name);
-        if !methods.iter().any(|(_, s)| has(s)) {
-            let known: Vec<_> = methods.iter().flat_map(|(_, s)| s.parameters()).map(|p| p.name).collect();
-            return Err(Error::Parameter {
-                parameter: "vary",
-                value: v.name.clone(),
-                remedy: format!("none of the methods has it; they have layers, smooth, optics, {}", known.join(", ")),
-            });
-        }
-        for (method, settings) in methods.iter().filter(|(_, s)| has(s)) {
-            for value in &v.values {
-                let mut changed = *settings;
-                if family {
-                    changed.method.choose(&v.name, value)?;
-                } else {
-                    changed.set(&v.name, value)?;
+    // Another member of a family has parameters of its own: families come first.
+    let (families, parameters): (Vec<&Vary>, Vec<&Vary>) = vary.iter().partition(|v| settings_has_family(&v.name));
+    let mut known = vec![false; vary.len()];
+    for (method, settings) in methods {
+        let mut made = vec![(Varied::new(), *settings)];
+        for (v, known) in families.iter().chain(&parameters).zip(&mut known) {
+            for (varied, settings) in made.clone() {
+                if !has(&settings, &v.name) || !combined && !varied.is_empty() {
+                    continue;
                 }
-                // Members of a family that do not go with the method's others are no way to draw.
-                match changed.validate() {
-                    Err(_) if family => continue,
-                    checked => checked?,
-                }
-                let varied = Some((v.name.clone(), value.clone()));
-                if !ways.iter().any(|w| w.method == *method && w.settings == changed) {
-                    ways.push(Way { method: method.clone(), varied, settings: changed });
+                *known = true;
+                for value in &v.values {
+                    let Some(changed) = with(&settings, v, value, !varied.is_empty())? else { continue };
+                    let varied = varied.iter().cloned().chain([(v.name.clone(), value.clone())]).collect();
+                    made.push((varied, changed));
                 }
             }
         }
+        for (varied, settings) in made {
+            if !ways.iter().any(|w| w.method == *method && w.settings == settings) {
+                ways.push(Way { method: method.clone(), varied, settings });
+            }
+        }
+    }
+    if let Some((v, _)) = families.iter().chain(&parameters).zip(known).find(|(_, known)| !known) {
+        let known: Vec<_> = methods.iter().flat_map(|(_, s)| s.parameters()).map(|p| p.name).collect();
+        return Err(Error::Parameter {
+            parameter: "vary",
+            value: v.name.clone(),
+            remedy: format!("none of the methods has it; they have layers, smooth, optics, {}", known.join(", ")),
+        });
     }
     Ok(ways)
+}
+
+fn has(settings: &Settings, name: &str) -> bool {
+    settings_has_family(name) || settings.parameters().iter().any(|p| p.name == name)
+}
+
+/// Settings with another value; `None` if it does not go with the others, which are `varied` themselves or of other families.
+fn with(settings: &Settings, v: &Vary, value: &str, varied: bool) -> Result<Option<Settings>, Error> {
+    let family = settings_has_family(&v.name);
+    let mut changed = *settings;
+    let set = if family { changed.method.choose(&v.name, value) } else { changed.set(&v.name, value) };
+    match set.and_then(|()| changed.validate()) {
+        Ok(()) => Ok(Some(changed)),
+        Err(_) if varied => Ok(None),
+        // Members of a family that do not go with the method's others are no way to draw.
+        Err(_) if family && changed != *settings => Ok(None),
+        Err(e) => Err(e),
+    }
 }
 
 fn settings_has_family(name: &str) -> bool {
@@ -122,7 +146,7 @@ pub struct Visit {
 pub struct Point {
     pub scene: String,
     pub method: String,
-    pub varied: Option<(String, String)>,
+    pub varied: Varied,
     pub settings: Map<String, Value>,
     /// Bytes of device memory.
     pub memory: u64,
@@ -130,18 +154,32 @@ pub struct Point {
     pub liquid: Means,
     /// Of the method's own surface, where it has one at pixels' centres.
     pub surface: Option<SurfaceError>,
+    /// Of its optics, traced exactly on the truth's surface; over the liquid.
+    pub light_model: Option<Means>,
+    /// Of its walk, beside an exact search in its own maps or field.
+    pub search: Option<SearchError>,
     pub visits: Vec<Visit>,
 }
 
 impl Point {
     pub fn name(&self) -> String {
-        name(&self.method, self.varied.as_ref())
+        name(&self.method, &self.varied)
     }
 
     /// Of the surface: silhouette's IoU, depth and its absolute value in radii, normals in degrees.
     pub fn surface_figures(&self) -> [Option<f64>; 4] {
         let s = self.surface;
         [s.map(|s| s.iou), s.and_then(|s| s.depth), s.and_then(|s| s.depth_absolute), s.and_then(|s| s.normal)]
+    }
+
+    /// Of the optics alone: FLIP and relative squared error.
+    pub fn light_figures(&self) -> [Option<f64>; 2] {
+        [self.light_model.map(|m| m.flip), self.light_model.map(|m| m.relative_mse)]
+    }
+
+    /// Of the search: pixels that miss, in percent, and the angle in degrees.
+    pub fn search_figures(&self) -> [Option<f64>; 2] {
+        [self.search.map(|s| 100.0 * s.missed), self.search.map(|s| s.angle)]
     }
 
     /// Milliseconds of all frames that were measured.
@@ -188,21 +226,56 @@ mod tests {
         }
     }
 
+    fn preset(name: &str) -> (String, Settings) {
+        (name.to_owned(), choices::preset(name).expect("a preset").method().into())
+    }
+
+    fn names(methods: &[(String, Settings)], vary: &[&str], combined: bool) -> Result<Vec<String>, Error> {
+        let vary: Vec<Vary> = vary.iter().map(|text| text.parse().expect("a variation")).collect();
+        Ok(ways(methods, &vary, combined)?.iter().map(Way::name).collect())
+    }
+
     #[test]
     fn ways_vary_one_thing_at_a_time() {
-        let preset = |name: &str| (name.to_owned(), choices::preset(name).expect("a preset").method().into());
         let methods = [preset("imai16"), preset("green10")];
-        let vary = |text: &str| text.parse::<Vary>().expect("a variation");
-        let ways = ways(&methods, &[vary("window=9,11"), vary("optics=one,four")]).expect("ways");
-        let names: Vec<_> = ways.iter().map(|w| name(&w.method, w.varied.as_ref())).collect();
+        let names = |vary: &[&str]| names(&methods, vary, false);
+        let found = names(&["window=9,11", "optics=one,four"]).expect("ways");
         // Nine is imai16's own window, and `four` its own optics; green10's layers have no far side for `four`.
-        assert!(names.starts_with(&["imai16".into(), "green10".into()]), "{names:?}");
-        assert!(names.contains(&"imai16 window=11".into()) && !names.contains(&"imai16 window=9".into()), "{names:?}");
-        assert!(
-            names.contains(&"imai16 optics=one".into()) && !names.contains(&"imai16 optics=four".into()),
-            "{names:?}"
-        );
-        let unknown = super::ways(&methods, &[vary("colour=1")]).expect_err("unknown").to_string();
+        assert!(found.starts_with(&["imai16".into(), "green10".into()]), "{found:?}");
+        let has = |name: &str| found.iter().any(|n| n == name);
+        assert!(has("imai16 window=11") && !has("imai16 window=9"), "{found:?}");
+        assert!(has("imai16 optics=one") && !has("imai16 optics=four"), "{found:?}");
+        assert!(!has("imai16 optics=one window=11"), "{found:?}");
+        let unknown = names(&["colour=1"]).expect_err("unknown").to_string();
         assert!(unknown.contains("colour") && unknown.contains("window"), "{unknown}");
+        assert!(names(&["smooth=polish"]).expect_err("unknown").to_string().contains("plane-fit"));
+        assert!(names(&["window=8"]).expect_err("even").to_string().contains("window"));
+    }
+
+    #[test]
+    fn ways_combine_all_that_varies() {
+        let mut found = names(&[preset("imai16")], &["window=5,9,11", "iterations=1,3"], true).expect("ways");
+        found.sort();
+        // Its own are 9 and 2.
+        let own = Settings::default();
+        let value =
+            |name: &str| own.parameters().into_iter().find(|p| p.name == name).expect("a parameter").value.to_string();
+        assert_eq!([value("window"), value("iterations")], ["9", "2"]);
+        let wanted = [
+            "imai16",
+            "imai16 iterations=1",
+            "imai16 iterations=3",
+            "imai16 window=11",
+            "imai16 window=11 iterations=1",
+            "imai16 window=11 iterations=3",
+            "imai16 window=5",
+            "imai16 window=5 iterations=1",
+            "imai16 window=5 iterations=3",
+        ];
+        assert_eq!(found, wanted);
+        // A parameter that only another member has, and one that the other member takes no such value of.
+        let found = names(&[preset("imai16")], &["time_step=0.01", "smooth=curvature-flow,none"], true).expect("ways");
+        assert!(found.contains(&"imai16 smooth=curvature-flow time_step=0.01".to_owned()), "{found:?}");
+        assert_eq!(found.len(), 4, "{found:?}");
     }
 }

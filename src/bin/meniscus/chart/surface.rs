@@ -1,53 +1,55 @@
-//! The renderer's own front surface at the centres of the picture's pixels.
+//! The renderer's own front surface, as pixels of the picture see it.
 
-use glam::{Mat3, Vec3};
+use glam::{DVec2, Mat3, Vec3};
 use meniscus::{
     Camera,
-    host::{HostError, Session},
-    inspect::Spec,
     shader::SIDE_FRONT,
-    study::measures::surface::Front,
-    twin::normal::decode_normal,
+    study::{measures::surface::Front, search::Walked},
+    twin::{normal::decode_normal, quadric::pixel_ray},
 };
 
-/// Of the last frame, which was rendered at `times` a picture's `size`. Nothing where no sample of it lies at pixels' centres: at
-/// an even multiple of the size, or of methods whose surfaces have half of it.
-pub fn fronts(
-    session: &mut Session,
-    camera: &Camera,
-    radius: f32,
-    size: [u32; 2],
-    times: u32,
-) -> Result<Option<Vec<Option<Front>>>, HostError> {
-    if times.is_multiple_of(2) {
-        return Ok(None);
-    }
-    let names = session.renderer.surfaces();
+/// Which pixel of those that a picture's is rendered as is looked at, each way.
+fn chosen(times: u32) -> u32 {
+    times / 2
+}
+
+/// Where its centre lies in the picture's pixel.
+pub fn within(times: u32) -> DVec2 {
+    DVec2::splat((f64::from(chosen(times)) + 0.5) / f64::from(times))
+}
+
+/// Of a frame that was rendered at `times` a picture's `size`; nothing of methods whose surfaces have another size.
+pub fn fronts(walked: &Walked, camera: &Camera, radius: f32, size: [u32; 2], times: u32) -> Option<Vec<Option<Front>>> {
+    let rendered = size.map(|n| n * times);
+    let at = |i: u32| [times * (i % size[0]) + chosen(times), times * (i / size[0]) + chosen(times)];
+    let pixels = 0..size[0] * size[1];
     let to_world = Mat3::from_mat4(camera.view).transpose();
-    let [width, height] = size.map(|n| n as usize);
-    let mut fronts: Vec<Option<Front>> = vec![None; width * height];
-    for (depth, normal) in [(names.splash_depth, names.splash_normal), (names.body_depth, names.body_normal)] {
-        let Some(depth) = depth else { continue };
-        let full = size.map(|n| n * times);
-        if !matches!(session.renderer.spec(depth), Some(Spec::Image(spec)) if spec.size == full) {
-            return Ok(None);
-        }
-        let depths = session.words(depth, SIDE_FRONT)?.unwrap_or_default();
-        let normals = normal.map_or(Ok(None), |name| session.words(name, SIDE_FRONT))?;
-        let times = times as usize;
-        for (i, front) in fronts.iter_mut().enumerate() {
-            let at = (i / width * times + times / 2) * width * times + i % width * times + times / 2;
-            // Where the near plane lies inside the liquid a depth is negative, and has no surface to face anywhere.
-            let Some(d) = depths.get(at).map(|w| f32::from_bits(*w)).filter(|d| *d != 0.0) else { continue };
-            let facing = normals.as_ref().filter(|_| d > 0.0).and_then(|n| n.get(at));
-            let found = Front {
-                depth: radius * d.abs(),
-                normal: facing.map(|code| (to_world * decode_normal(*code)).normalize_or(Vec3::Y)),
-            };
-            if front.is_none_or(|nearer| found.depth < nearer.depth) {
-                *front = Some(found);
-            }
-        }
+    if let Some(field) = &walked.field {
+        let eye = camera.view.as_dmat4().inverse().w_axis.truncate();
+        let front = |i| {
+            let [x, y] = at(i);
+            let v = pixel_ray(&walked.frame, x, y).normalize();
+            let (t, normal) = field.first(eye, to_world.as_dmat3() * v)?;
+            Some(Front { depth: (t * -v.z) as f32, normal: Some(normal.as_vec3()) })
+        };
+        return Some(pixels.map(front).collect());
     }
-    Ok(Some(fronts))
+    let sides = walked.maps.each_ref().map(|class| &class[SIDE_FRONT as usize]);
+    let all = (rendered[0] * rendered[1]) as usize;
+    if sides.iter().any(|(depths, _)| !depths.is_empty() && depths.len() != all) {
+        return None;
+    }
+    let front = |i| {
+        let [x, y] = at(i);
+        let index = (y * rendered[0] + x) as usize;
+        let found = sides.iter().filter_map(|(depths, normals)| {
+            // Where the near plane lies inside the liquid a depth is negative, and has no surface to face anywhere.
+            let d = *depths.get(index).filter(|d| **d != 0.0)?;
+            let facing = normals.get(index).filter(|_| d > 0.0);
+            let normal = facing.map(|code| (to_world * decode_normal(*code)).normalize_or(Vec3::Y));
+            Some(Front { depth: radius * d.abs(), normal })
+        });
+        found.min_by(|a, b| a.depth.total_cmp(&b.depth))
+    };
+    Some(pixels.map(front).collect())
 }

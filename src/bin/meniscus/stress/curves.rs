@@ -33,14 +33,19 @@ pub fn draw(case: &Case, measure: usize, runs: &[&Run]) -> Result<Option<String>
             .margin(12)
             .x_label_area_size(44)
             .y_label_area_size(64)
-            .build_cartesian_2d(place(low) - room..place(high) + room, 0.0..1.08 * top.max(bound))?;
+            .build_cartesian_2d(
+                place(low) - room..place(high) + room,
+                0.0..1.08 * if bound.is_finite() { top.max(bound) } else { top },
+            )?;
         let what = if by_powers { format!("log10 of {}", case.x) } else { case.x.to_owned() };
         chart.configure_mesh().x_desc(what).light_line_style(WHITE).label_style(("sans-serif", 13)).draw()?;
         let ends = [(place(low) - room, bound), (place(high) + room, bound)];
-        chart
-            .draw_series(DashedLineSeries::new(ends, 6, 4, BLACK.stroke_width(1)))?
-            .label("bound")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 16, y)], BLACK));
+        if bound.is_finite() {
+            chart
+                .draw_series(DashedLineSeries::new(ends, 6, 4, BLACK.stroke_width(1)))?
+                .label("bound")
+                .legend(|(x, y)| PathElement::new([(x, y), (x + 16, y)], BLACK));
+        }
         for (i, (method, points)) in lines.iter().enumerate() {
             let color = Palette99::pick(i).to_rgba();
             let points: Vec<_> = points.iter().map(|(x, y)| (place(*x), *y)).collect();

@@ -9,11 +9,13 @@ use crate::{
 use meniscus::{
     Equirect,
     io::{Budget, quote},
+    prepare::PrepareError,
     study::{
         film::Film,
+        isosurface::isosurface,
         mesh::Mesh,
         mesh_file,
-        reconstruct::{self, ReconstructError},
+        reconstruct::{self, ReconstructError, Reconstruction},
     },
 };
 use std::{
@@ -26,7 +28,7 @@ pub struct Cache {
 }
 
 /// Part of every film's name: another number where the tracer draws other samples.
-const TRACER: u32 = 1;
+const TRACER: u32 = 2;
 /// Part of every surface's name: another number where another mesh would be made.
 const SURFACE: u32 = 1;
 
@@ -34,6 +36,8 @@ const SURFACE: u32 = 1;
 pub enum CacheError {
     #[error(transparent)]
     Reconstruct(#[from] ReconstructError),
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("{}: the mesh cannot be packed ({source}); use fewer particles", path.display())]
@@ -51,20 +55,32 @@ impl Cache {
     }
 
     /// The mesh around particles, in the file's coordinates: the one that was made of them before, if it is still there.
-    pub fn mesh_of(&self, scene: &Scene, passes: u32) -> Result<Mesh, CacheError> {
+    pub fn mesh_of(&self, scene: &Scene, how: Reconstruction) -> Result<Mesh, CacheError> {
         let radius = scene.particles.radius;
+        let points = match how {
+            Reconstruction::Smoothed(_) => Vec::new(),
+            Reconstruction::Isosurface => scene.points()?,
+        };
         let mut key = blake3::Hasher::new();
         key.update(&SURFACE.to_le_bytes());
         key.update(bytemuck::cast_slice(&scene.positions));
         key.update(&radius.to_le_bytes());
-        key.update(&passes.to_le_bytes());
+        match how {
+            Reconstruction::Smoothed(passes) => key.update(&passes.to_le_bytes()),
+            // Of classes, too, and of how densities are counted.
+            Reconstruction::Isosurface => key.update(format!("{how} {:?} {:?}", scene.options, points).as_bytes()),
+        };
         scene.origin.to_array().iter().for_each(|v| _ = key.update(&v.to_le_bytes()));
         let note = self.place.join(format!("surface-{}.txt", &key.finalize().to_hex()[..32]));
         if let Some(mesh) = self.noted(&note) {
             return Ok(mesh);
         }
         let bar = spinner("surface of the particles");
-        let mesh = reconstruct::reconstruct(&scene.positions, radius, passes)?.moved(scene.origin);
+        let mesh = match how {
+            Reconstruction::Smoothed(passes) => reconstruct::reconstruct(&scene.positions, radius, passes)?,
+            Reconstruction::Isosurface => isosurface(&points, radius)?,
+        };
+        let mesh = mesh.moved(scene.origin);
         bar.finish_and_clear();
         let hash = mesh.hash();
         let path = self.mesh_path(&hash);
