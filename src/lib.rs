@@ -46,6 +46,7 @@
 #![warn(clippy::undocumented_unsafe_blocks)]
 
 mod access;
+pub mod auto;
 pub mod device;
 pub mod environment;
 pub mod error;

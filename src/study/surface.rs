@@ -8,7 +8,7 @@ use obvhs::{
     cwbvh::{CwBvh, builder::build_cwbvh},
     ray::{Ray as BoxRay, RayHit},
 };
-use std::time::Duration;
+use std::{collections::HashSet, time::Duration};
 
 /// A half-line.
 #[derive(Clone, Copy, Debug)]
@@ -99,6 +99,14 @@ impl Sight {
 }
 
 impl Triangle {
+    /// The same for the same triangle, whichever corner comes first.
+    fn place(&self) -> [[u64; 3]; 3] {
+        let mut corners = self.corners.map(|c| c.to_array().map(f64::to_bits));
+        let least = (0..3).min_by_key(|i| corners[*i]).unwrap_or(0);
+        corners.rotate_left(least);
+        corners
+    }
+
     /// Distance along a ray, and the weights of the second and third corner. Two triangles round the same about the edge that they
     /// share, so that no ray gets through between them.
     fn meets(&self, sight: &Sight) -> Option<(f64, f64, f64)> {
@@ -115,12 +123,15 @@ impl Triangle {
 }
 
 impl MeshSurface {
-    /// From a mesh that [`Mesh::check`] accepts. Triangles without area are left out: no ray meets them.
+    /// From a mesh that [`Mesh::check`] accepts. Triangles without area are left out: no ray meets them. So is what is there again:
+    /// boxes at one place make the hierarchy as deep as there are many, and it goes no deeper than 32.
     pub fn new(mesh: &Mesh) -> MeshSurface {
         let (low, high) = mesh.bounds();
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
         let scale = REACH / half.max_element();
-        let mut triangles: Vec<Triangle> = mesh.triangles.iter().filter_map(|t| triangle(mesh, *t)).collect();
+        let mut known = HashSet::with_capacity(mesh.triangles.len());
+        let all = mesh.triangles.iter().filter_map(|t| triangle(mesh, *t));
+        let mut triangles: Vec<Triangle> = all.filter(|t| known.insert(t.place())).collect();
         let boxes: Vec<Aabb> = triangles
             .iter()
             .map(|t| {

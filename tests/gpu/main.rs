@@ -2,6 +2,7 @@
 
 mod access;
 mod analytic;
+mod auto;
 mod background;
 mod behind;
 #[cfg(feature = "study")]

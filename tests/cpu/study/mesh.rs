@@ -107,6 +107,25 @@ fn rays_along_axes_meet_what_others_meet() {
     assert!(met > 100_000, "{met}");
 }
 
+/// What is there many times is met as if it were there once.
+#[test]
+fn triangles_that_come_again_change_nothing() {
+    let once = ball(DVec3::ZERO, 1.0, 4);
+    let mut often = once.clone();
+    for k in 0..400 {
+        often.triangles.extend(once.triangles.iter().map(|[a, b, c]| [[*a, *b, *c], [*b, *c, *a]][k % 2]));
+    }
+    often.check().expect("closed");
+    let (once, often) = (MeshSurface::new(&once), MeshSurface::new(&often));
+    let mut random = Random::of(4, 4);
+    for _ in 0..500 {
+        let (origin, aim) = (3.0 * direction(&mut random), 0.9 * direction(&mut random));
+        let ray = Ray { origin, dir: (aim - origin).normalize() };
+        let [a, b] = [&once, &often].map(|s| s.hit(&ray, None).map(|hit| (hit.t, hit.geometric)));
+        assert_eq!(a, b, "{ray:?}");
+    }
+}
+
 /// A fine mesh with a ball's normals bends light as the ball does; without normals facets show.
 #[test]
 fn interpolated_normals_bend_light() {
