@@ -1,9 +1,9 @@
 // The density field as bricks of nodes, where there is any (docs/methods.md, "Density field"). MARK enters the bricks that points reach
 // in the directory, block by block, NUMBER numbers them, SCATTER adds each point's share to the nodes that it reaches, as whole numbers, whose
-// sum does not hang on the order, and lists the balls in each brick; FINISH finds the cells that hold the surface, and puts together what
+// sum does not hang on the order, and lists the balls in each brick; STRAY makes balls, too, of the body's particles that the field does not enclose; FINISH finds the cells that hold the surface, and puts together what
 // a walk looks at in them.
 #version 460
-// Compiled with one of: MARK, NUMBER, SCATTER, FINISH
+// Compiled with one of: MARK, NUMBER, SCATTER, STRAY, FINISH
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"
@@ -27,7 +27,7 @@ layout(set = 0, binding = 3, std430) readonly buffer PointBlock { vec4 at[]; } p
 #ifndef MARK
 layout(set = 0, binding = 6, std430) buffer RecordBlock { uint at[]; } records;
 #endif
-#if defined(SCATTER) || defined(FINISH)
+#if defined(SCATTER) || defined(STRAY) || defined(FINISH)
 layout(set = 0, binding = 7, std430) buffer NodeBlock { uint at[]; } nodes;
 #endif
 
@@ -180,8 +180,7 @@ void main() {
 }
 #endif
 
-#ifdef SCATTER
-layout(constant_id = 1) const int ACROSS = 6; // nodes that a kernel can reach on an axis
+#if defined(SCATTER) || defined(STRAY)
 layout(set = 0, binding = 8, std430) writeonly buffer BallBlock { uvec2 at[]; } balls;
 
 // Enters a ball in the list of a brick, the k-th of a slot's block.
@@ -195,6 +194,41 @@ void list_ball(Reach r, ivec3 brick, uint slot, uint k, uint number) {
     uint next = atomicExchange(records.at[number * FIELD_RECORD + FIELD_FIRST_BALL], entry + 1u);
     balls.at[entry] = uvec2(field_packed_ball(vec3(r.node - (brick << FIELD_BRICK_BITS)) + r.part), next);
 }
+
+#endif
+
+#ifdef STRAY
+void main() {
+    uint i = invocation();
+    vec4 point = points.at[min(i, build.count - 1u)];
+    // A loop, since drivers on CPUs may run a branch for all invocations that go together where none takes it.
+    for (bool look = i < build.count && point.w > 0.0 && point.w < FIELD_SURE; look; look = false) {
+        ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
+        Reach r = reach_of(vec4(point.xyz, -1.0));
+        // The field where it is, between nodes.
+        float f = 0.0;
+        uvec4 words;
+        for (uint c = 0u; c < 8u; ++c) {
+            ivec3 step = ivec3(c & 1u, (c >> 1) & 1u, c >> 2), node = r.node + step;
+            vec3 weights = mix(1.0 - r.part, r.part, bvec3(step));
+            field_slot(field_brick(field_brick(node)), base, build.slots, words);
+            uint local = field_local(field_brick(node));
+            uint number = field_bit(field_there(words), local) ? words[FIELD_FIRST_BRICK] + field_before(field_there(words), local) : 0u;
+            uint pair = nodes.at[FIELD_NODE_WORDS * number + field_local(node) / 2u];
+            f += weights.x * weights.y * weights.z * float(int(pair >> (16 * (node.x & 1)) & 0xffffu));
+        }
+        for (uint k = 0u; f < FIELD_ENCLOSED * float(build.level) && k < 8u; ++k) {
+            ivec3 brick = r.first + ivec3(k & 1u, (k >> 1) & 1u, k >> 2);
+            uint slot = field_slot(field_brick(brick), base, build.slots, words), local = field_local(brick);
+            bool there = all(lessThanEqual(brick, r.last)) && reaches(r, brick) && field_bit(field_there(words), local);
+            if (there) list_ball(r, brick, slot, local, words[FIELD_FIRST_BRICK] + field_before(field_there(words), local));
+        }
+    }
+}
+#endif
+
+#ifdef SCATTER
+layout(constant_id = 1) const int ACROSS = 6; // nodes that a kernel can reach on an axis
 
 // Of the three bricks along each axis those in which a row of nodes lies.
 uvec3 one_of(uvec3 first, uvec3 second, uvec3 third, int which) { return which == 0 ? first : which == 1 ? second : third; }

@@ -15,7 +15,7 @@ use crate::{
     shader::{
         FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_MARK_COMP, FIELD_MOST_BRICKS,
         FIELD_NODE_WORDS, FIELD_NODES, FIELD_NUMBER_COMP, FIELD_ONE, FIELD_RECORD, FIELD_SCATTER_COMP, FIELD_SLOT,
-        FieldBuild, FieldHead, PARTICLE_GROUP, SPLASH_RADIUS, Shader,
+        FIELD_STRAY_COMP, FieldBuild, FieldHead, PARTICLE_GROUP, SPLASH_RADIUS, Shader,
     },
     space::power_of_two,
 };
@@ -144,6 +144,14 @@ impl Field {
             .constant("ACROSS", (2.0 * build.reach).ceil() as u32)
             .counting(&COUNTED);
         plan.dispatch("field", scatter, per_particle(build.count));
+        let stray = call(&FIELD_STRAY_COMP)
+            .update("head", head)
+            .read("points", points.points)
+            .update("records", records)
+            .read("nodes", nodes)
+            .update("balls", balls)
+            .counting(&COUNTED);
+        plan.dispatch("field", stray, per_particle(build.count));
         let finish = call(&FIELD_FINISH_COMP)
             .read("head", head)
             .update("records", records)

@@ -5,9 +5,9 @@ use crate::{
     prepare::density::{rest_density, spline},
     shader::{
         FIELD_BALL, FIELD_BALL_BELOW, FIELD_BALL_BITS, FIELD_BALL_STEPS, FIELD_BALLS, FIELD_BRICK, FIELD_CELL_RECORD,
-        FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_FIRST_BALL, FIELD_FIRST_BRICK, FIELD_FIRST_CELL, FIELD_HALF,
-        FIELD_INSIDE, FIELD_NODE_WORDS, FIELD_NODES, FIELD_ONE, FIELD_PLACE, FIELD_PROBES, FIELD_RECORD, FIELD_SLOT,
-        FIELD_STEEPEST, FIELD_SURFACE, FIELD_THERE, SPLASH_RADIUS,
+        FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_ENCLOSED, FIELD_FIRST_BALL, FIELD_FIRST_BRICK, FIELD_FIRST_CELL,
+        FIELD_HALF, FIELD_INSIDE, FIELD_NODE_WORDS, FIELD_NODES, FIELD_ONE, FIELD_PLACE, FIELD_PROBES, FIELD_RECORD,
+        FIELD_SLOT, FIELD_STEEPEST, FIELD_SURE, FIELD_SURFACE, FIELD_THERE, SPLASH_RADIUS,
     },
     space::power_of_two,
 };
@@ -242,6 +242,22 @@ impl Words<'_> {
 /// Two words as one, the lower bits first.
 fn bits(words: &[u32]) -> u64 {
     u64::from(words[0]) | u64::from(words[1]) << 32
+}
+
+/// Whether the field encloses a particle of the body with this density, at x in spacings: there by how much, as a part of the
+/// level, or surely. One that it does not is a ball, too.
+pub fn enclosed(bricks: &BTreeMap<Place, Brick>, level: f64, x: DVec3, density: f64) -> f64 {
+    if density >= f64::from(FIELD_SURE) {
+        return f64::INFINITY;
+    }
+    let first = x.floor();
+    let f = x - first;
+    let corners = places(IVec3::ZERO, IVec3::ONE).map(|step| {
+        let [a, b, c] = [0, 1, 2].map(|axis| if step[axis] == 1 { f[axis] } else { 1.0 - f[axis] });
+        let node = (first.as_ivec3() + IVec3::from(step)).to_array();
+        a * b * c * f64::from(node_of(bricks, node)) / f64::from(FIELD_ONE)
+    });
+    corners.sum::<f64>() / (f64::from(FIELD_ENCLOSED) * level)
 }
 
 /// The field at a node times [`FIELD_ONE`], from bricks; 0 where there is none.
