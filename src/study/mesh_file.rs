@@ -209,18 +209,28 @@ fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
     corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
 }
 
-/// Refuses elements that name what no file of this size has: its crate multiplies indices before it looks.
+/// Refuses elements that name what is not there: its crate counts back from the last one, and multiplies, before it looks.
 fn check_indices(bytes: &[u8]) -> Result<(), String> {
+    // Of vertices, of what maps are looked up by, of normals.
+    let mut counts = [0i128; 3];
     for (i, line) in bytes.split(|b| *b == b'\n').enumerate() {
-        let line = line.trim_ascii();
-        if !matches!(line.first(), Some(b'f' | b'l' | b'p')) {
-            continue;
-        }
-        let words = line.split(|b| b.is_ascii_whitespace() || *b == b'/').filter_map(|w| str::from_utf8(w).ok());
-        // What is no number at all the crate refuses.
-        let far = |index: &i128| index.unsigned_abs() > bytes.len() as u128;
-        if let Some(index) = words.filter_map(|w| w.parse::<i128>().ok()).find(far) {
-            return Err(format!("line {} names number {index}, and there are not so many", i + 1));
+        let line = String::from_utf8_lossy(line);
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => counts[0] += 1,
+            Some("vt") => counts[1] += 1,
+            Some("vn") => counts[2] += 1,
+            Some("f" | "l" | "p") => {
+                for (part, count) in words.flat_map(|word| word.split('/').zip(counts)) {
+                    // What follows may still be named forwards. What is no number at all the crate refuses.
+                    let there =
+                        |index: &i128| *index > 0 && *index <= bytes.len() as i128 || *index < 0 && -index <= count;
+                    if let Some(index) = part.parse().ok().filter(|index| !there(index)) {
+                        return Err(format!("line {} names number {index}, which is not there", i + 1));
+                    }
+                }
+            }
+            _ => {}
         }
     }
     Ok(())

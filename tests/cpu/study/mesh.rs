@@ -224,10 +224,11 @@ fn mesh_files_give_the_mesh() {
         let said = failed(file(name, content.as_bytes())).to_string();
         assert!(said.contains(name) && said.contains("export"), "{said}");
     }
-    let far =
-        fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/obj_far_index.mesh-obj")).expect("kept");
-    let said = failed(file("far.obj", &far)).to_string();
-    assert!(said.contains("far.obj: line 6 names number 9223372036854775807"), "{said}");
+    for (name, line, index) in [("far_index", 6, "9223372036854775807"), ("before_first", 5, "-3")] {
+        let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/corpus/obj_{name}.mesh-obj"));
+        let said = failed(file("kept.obj", &fs::read(kept).expect("kept"))).to_string();
+        assert!(said.contains(&format!("kept.obj: line {line} names number {index}")), "{said}");
+    }
     let lie = header.replace("vertex 4", "vertex 4000000000");
     let said = failed(file("lie.ply", lie.as_bytes())).to_string();
     assert!(said.contains("lie.ply") && said.contains("promises 4000000000 entries"), "{said}");
