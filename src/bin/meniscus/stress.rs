@@ -90,7 +90,10 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
         for (measure, name) in case.measures.iter().enumerate().map(|(i, m)| (i, m.name)) {
             let Some(svg) = curves::draw(case, measure, &own)? else { continue };
             let file = format!("{}, {}.svg", case.name, name.replace('%', "percent"));
-            outputs::write(&args.output.join(file.replace([' ', ','], "-").replace("--", "-")), svg.as_bytes())?;
+            outputs::write(
+                &args.output.join(file.replace('\'', "").replace([' ', ','], "-").replace("--", "-")),
+                svg.as_bytes(),
+            )?;
         }
     }
     let table = table(&cases, &methods, &runs);
