@@ -213,7 +213,7 @@ impl Args {
         }
         let mut session = Session::new(gpu, picture.rendered_size()?, &picture.environment()?)?;
         let (frames, rounds) = (self.frames, self.rounds);
-        let job = measure::Job { frames, rounds, name, picture, scene: &scene, truth: &truth, device };
+        let job = measure::Job { frames, rounds, name, picture, scene: &scene, truth: &truth, explained: true, device };
         let points = measure::all(&job, ways, store, &mut session);
         session.end();
         let points = points?;

@@ -131,7 +131,16 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let name =
         args.file.as_deref().or(picture.particles.as_deref()).map_or("dam break".into(), |f| f.display().to_string());
     let (frames, rounds) = (args.frames, args.rounds);
-    let job = Job { frames, rounds, name: &name, picture: &picture, scene: &scene, truth: &truth, device: &label };
+    let job = Job {
+        frames,
+        rounds,
+        name: &name,
+        picture: &picture,
+        scene: &scene,
+        truth: &truth,
+        explained: false,
+        device: &label,
+    };
     let found = args.search(goal, &job, &store, &mut session);
     session.end();
     let (ways, found) = found.map_err(on_device)?;

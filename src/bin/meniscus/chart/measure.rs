@@ -43,6 +43,8 @@ pub struct Job<'a> {
     pub picture: &'a Picture,
     pub scene: &'a Scene,
     pub truth: &'a Truth,
+    /// Whether it is said where errors come from, which takes longer than to say how large they are.
+    pub explained: bool,
     pub device: &'a str,
 }
 
@@ -58,7 +60,7 @@ pub fn all(
     let mut given = None;
     let mut upload = None;
     let (camera, eye, _) = job.picture.camera(job.scene)?;
-    let protocol = format!("{} {} {}", job.frames, job.rounds, job.picture.supersample);
+    let protocol = format!("{} {} {} {}", job.frames, job.rounds, job.picture.supersample, job.explained);
     let parts = [job.name, &job.truth.key, job.device, crate::report::COMMIT, &protocol];
     let keys: Vec<String> = ways.iter().map(|way| points::key(&parts, &way.settings)).collect();
     let mut found: Vec<Option<Point>> = keys.iter().map(|key| store.point(key)).collect();
@@ -116,7 +118,7 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// The last frame's errors, without times yet; draws one more that says what walks met.
+    /// The last frame's errors, without times yet; may draw one more that says what walks met.
     fn point(
         &mut self,
         way: &Way,
@@ -133,31 +135,42 @@ impl Judge<'_> {
         outputs::write(&path, &images::encode_picture(&path, picture.size, &picture.pixels)?)?;
         let path = store.error_map(key);
         outputs::write(&path, &images::encode_srgb_png(&path, picture.size, &measures::magma(&maps.flip))?)?;
-        let memory = session.renderer.memory().iter().map(|e| e.bytes).sum();
+        let mut point = Point {
+            scene: job.name.to_owned(),
+            method: way.method.clone(),
+            varied: way.varied.clone(),
+            settings: crate::choices::record(&way.settings),
+            memory: session.renderer.memory().iter().map(|e| e.bytes).sum(),
+            picture: maps.means(None)?,
+            liquid: maps.means(Some(&job.truth.liquid()))?,
+            surface: None,
+            light_model: None,
+            search: None,
+            visits: Vec::new(),
+        };
+        if job.explained {
+            self.explain(&mut point, input, session)?;
+        }
+        Ok(point)
+    }
+
+    /// Where the error comes from.
+    fn explain(&mut self, point: &mut Point, input: &FrameInput, session: &mut Session) -> Result<(), Box<dyn Error>> {
+        let (job, times) = (self.job, self.job.picture.supersample);
         session.renderer.inspect(Inspection { walks: true, ..Inspection::default() });
         session.frame(input)?;
         let frame = session.block()?;
         let walked = Walked::read(session, frame, input.settings, &job.scene.particles)?;
         session.renderer.inspect(Inspection::default());
         let radius = job.scene.particles.radius;
-        let surface = surface::fronts(&walked, input.camera, radius, picture.size, times).and_then(|seen| {
+        point.surface = surface::fronts(&walked, input.camera, radius, job.picture.size, times).and_then(|seen| {
             let truth = job.truth.trace(|tracer, _| first::maps_at(tracer, surface::within(times)));
             measures::surface::compare(&truth, &seen, radius)
         });
         let most = if walked.field.is_some() { SEARCHED_IN_FIELD } else { SEARCHED };
-        Ok(Point {
-            scene: job.name.to_owned(),
-            method: way.method.clone(),
-            varied: way.varied.clone(),
-            settings: crate::choices::record(&way.settings),
-            memory,
-            picture: maps.means(None)?,
-            liquid: maps.means(Some(&job.truth.liquid()))?,
-            surface,
-            light_model: self.light_model(input.settings)?,
-            search: walked.error(input.settings, &self.sky, most),
-            visits: Vec::new(),
-        })
+        point.search = walked.error(input.settings, &self.sky, most);
+        point.light_model = self.light_model(input.settings)?;
+        Ok(())
     }
 
     /// Over the liquid; traced once for all methods with these optics.
