@@ -269,14 +269,14 @@ mod tests {
             .expect("valid")
     }
 
-    /// Frames whose choices take so many times a scene's load, observed two frames later; the names picked, one for each change.
+    /// Frames whose choices take so many times a scene's load, observed six frames later; the names picked, one for each change.
     fn run(auto: &mut Auto, frames: usize, load: impl Fn(usize) -> f64) -> Vec<String> {
         let mut flying = std::collections::VecDeque::new();
         let mut picked = Vec::new();
         for i in 0..frames {
             let pick = auto.pick();
             flying.push_back((pick, load(i) * [10.0, 6.0, 2.0][pick.0]));
-            if flying.len() > 2 {
+            if flying.len() > 6 {
                 let (of, span_ms) = flying.pop_front().expect("frames");
                 let before = auto.pick();
                 let why = auto.observe(of, &FrameTimes { passes: Vec::new(), span_ms }, &[]).cloned();
