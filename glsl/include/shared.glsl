@@ -266,9 +266,7 @@ struct Prepare {
 // unless that is less than this part of its own: crowds, whose sum would outgrow a node (2 in a body however dense, and 4.8
 // around particles on one spot under the narrowest kernel; a node has room for 8).
 #define FIELD_CROWD 0.5
-// The field encloses a particle of the body where it is so many times its level there: with less thin sheets have holes, with more
-// balls show on surfaces. From this number density on, as a part of a filled body's, it does in any case.
-#define FIELD_ENCLOSED 1.03
+// From this number density on, as a part of a filled body's, the field encloses a particle of the body.
 #define FIELD_SURE 0.9
 // The most that one particle adds to a node: below it whatever density the host says.
 #define FIELD_MOST_SHARE 32767.0

@@ -217,7 +217,7 @@ void main() {
             uint pair = nodes.at[FIELD_NODE_WORDS * number + field_local(node) / 2u];
             f += weights.x * weights.y * weights.z * float(int(pair >> (16 * (node.x & 1)) & 0xffffu));
         }
-        for (uint k = 0u; f < FIELD_ENCLOSED * float(build.level) && k < 8u; ++k) {
+        for (uint k = 0u; f < float(build.level) && k < 8u; ++k) {
             ivec3 brick = r.first + ivec3(k & 1u, (k >> 1) & 1u, k >> 2);
             uint slot = field_slot(field_brick(brick), base, build.slots, words), local = field_local(brick);
             bool there = all(lessThanEqual(brick, r.last)) && reaches(r, brick) && field_bit(field_there(words), local);

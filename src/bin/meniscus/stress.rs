@@ -101,8 +101,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     for line in table {
         terminal::line(line)?;
     }
-    let broken: Vec<_> =
-        runs.iter().filter(|r| r.case.promised && r.method == PRESETS[0].name && r.fault.is_some()).collect();
+    let broken: Vec<_> = runs.iter().filter(|r| r.case.promised.contains(&r.method) && r.fault.is_some()).collect();
     for r in &broken {
         terminal::complain(format!(
             "meniscus: {} does not keep what it promises: {}: {}",
@@ -206,7 +205,7 @@ fn record(run: &Run) -> Value {
         "method": run.method,
         "x": {"what": run.case.x, "at": run.steps.iter().map(|s| s.x).collect::<Vec<_>>()},
         "figures": run.case.measures.iter().enumerate().map(each).collect::<Vec<_>>(),
-        "promised": run.case.promised,
+        "promised": run.case.promised.contains(&run.method),
         "pass": (run.fault.is_some() || run.is_measured()).then_some(run.fault.is_none()),
         "why": why(run),
     })

@@ -5,9 +5,9 @@ use crate::{
     prepare::density::{rest_density, spline},
     shader::{
         FIELD_BALL, FIELD_BALL_BELOW, FIELD_BALL_BITS, FIELD_BALL_STEPS, FIELD_BALLS, FIELD_BRICK, FIELD_CELL_RECORD,
-        FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_ENCLOSED, FIELD_FIRST_BALL, FIELD_FIRST_BRICK, FIELD_FIRST_CELL,
-        FIELD_HALF, FIELD_INSIDE, FIELD_NODE_WORDS, FIELD_NODES, FIELD_ONE, FIELD_PLACE, FIELD_PROBES, FIELD_RECORD,
-        FIELD_SLOT, FIELD_STEEPEST, FIELD_SURE, FIELD_SURFACE, FIELD_THERE, SPLASH_RADIUS,
+        FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_FIRST_BALL, FIELD_FIRST_BRICK, FIELD_FIRST_CELL, FIELD_HALF,
+        FIELD_INSIDE, FIELD_NODE_WORDS, FIELD_NODES, FIELD_ONE, FIELD_PLACE, FIELD_PROBES, FIELD_RECORD, FIELD_SLOT,
+        FIELD_STEEPEST, FIELD_SURE, FIELD_SURFACE, FIELD_THERE, SPLASH_RADIUS,
     },
     space::power_of_two,
 };
@@ -257,7 +257,7 @@ pub fn enclosed(bricks: &BTreeMap<Place, Brick>, level: f64, x: DVec3, density: 
         let node = (first.as_ivec3() + IVec3::from(step)).to_array();
         a * b * c * f64::from(node_of(bricks, node)) / f64::from(FIELD_ONE)
     });
-    corners.sum::<f64>() / (f64::from(FIELD_ENCLOSED) * level)
+    corners.sum::<f64>() / level
 }
 
 /// The field at a node times [`FIELD_ONE`], from bricks; 0 where there is none.

@@ -41,7 +41,7 @@ pub const GRAZING: Case = Case {
     name: "grazing",
     about: "a flat surface of jittered particles, seen at ever flatter angles",
     x: "degrees from its normal",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         Measure { name: "holes, % of its pixels", bound: 0.0, beyond: "a covered region has holes" },
@@ -108,7 +108,7 @@ pub const CRITICAL: Case = Case {
     name: "critical angle",
     about: "an eye in a block looks at its face; beyond 48.6 degrees light is reflected there",
     x: "degrees from the face's normal",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         Measure { name: "directions of what leaves off, degrees", bound: 10.0, beyond: "light goes elsewhere" },
@@ -156,12 +156,15 @@ fn critical(rig: &mut Rig, settings: &Settings, steps: &[f64]) -> Result<Vec<Ste
     Ok(found)
 }
 
+/// By how much edges may be rounded, in radii: what is left of a corner is a particle's own.
+const ROUNDED: f64 = 2.0;
+
 /// A body's rims, where surfaces end and turn away.
 pub const RIMS: Case = Case {
     name: "rims",
-    about: "a block of jittered particles from around a corner: edges, silhouettes, depth jumps",
+    about: "a block of jittered particles from around a corner: edges, which may be rounded by two radii, silhouettes, depth jumps",
     x: "degrees around it",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         Measure { name: "holes, % of what must be liquid", bound: 0.1, beyond: "a covered region has holes" },
@@ -183,6 +186,11 @@ fn rims(rig: &mut Rig, settings: &Settings, steps: &[f64]) -> Result<Vec<Step>, 
     let far = 40.0 * DVec3::NEG_Z;
     cloud.extend(clouds::block([24, 18, 2]).into_iter().map(|p| p + far.as_vec3()));
     let behind = Shape::Block(DVec3::new(24.0, 18.0, 2.0));
+    // How far a point is outside of the block with its edges rounded.
+    let rounded = |at: DVec3| {
+        let q = at.abs() - (half - ROUNDED);
+        q.max(DVec3::ZERO).length() + q.max_element().min(0.0) - ROUNDED
+    };
     let mut found = Vec::new();
     for &x in steps {
         let (sin, cos) = x.to_radians().sin_cos();
@@ -191,20 +199,24 @@ fn rims(rig: &mut Rig, settings: &Settings, steps: &[f64]) -> Result<Vec<Step>, 
         let (mut must, mut holes, mut distances, mut normals) = (0, 0, Vec::new(), Vec::new());
         for i in 0..shot.picture.len() {
             let (eye, dir) = shot.ray(i);
-            let near = |grown: f64| Shape::Block(half + grown).crossings(eye, dir).map(|[enter, _]| enter);
+            let grown = |by: f64| Shape::Block(half + by).crossings(eye, dir);
+            let inside = |[(enter, _), (leave, _)]: [(f64, DVec3); 2]| {
+                (0..=100).any(|k| rounded(eye + (enter + (leave - enter) * f64::from(k) / 100.0) * dir) < -0.7)
+            };
             // Between the two either may be met.
-            let (inner, outer) = (near(-0.7), near(0.7));
-            let met = match (inner, outer) {
-                (Some(_), _) => near(0.0),
-                (None, None) => behind.crossings(eye - far, dir).map(|[enter, _]| enter),
+            let inner = grown(0.0).is_some_and(inside);
+            let met = match (inner, grown(0.7)) {
+                (true, _) => grown(0.0),
+                (false, None) => behind.crossings(eye - far, dir),
                 _ => None,
             };
-            let Some((t, normal)) = met else { continue };
-            if let Some(covered) = shot.covered(i).filter(|_| inner.is_some()) {
+            let Some([(t, normal), _]) = met else { continue };
+            if let Some(covered) = shot.covered(i).filter(|_| inner) {
                 must += 1;
                 holes += usize::from(!covered);
             }
-            distances.extend(shot.at(i).map(|at| (at - (eye + t * dir)).dot(normal).abs()));
+            let off = |at: DVec3| if inner { rounded(at) } else { (at - (eye + t * dir)).dot(normal) };
+            distances.extend(shot.at(i).map(|at| off(at).abs()));
             normals.extend(shot.normal(i).map(|n| degrees(n, normal)));
         }
         let off = [quantile(distances, 0.99), quantile(normals, 0.9)];

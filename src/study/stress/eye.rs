@@ -18,7 +18,7 @@ pub const DOLLY_BALL: Case = Case {
     name: "dolly through a ball",
     about: "the eye goes straight through a ball of liquid of 12 radii: huge sprites, the near plane, the eye inside",
     x: "distance of the eye before the middle, ball radii",
-    promised: true,
+    promised: super::BOTH,
     measures: &[NO_NUMBER, COVER, GROWN],
     steps: |extent| {
         extent.of(&[4.0, 1.15, 0.5], &[4.0, 3.0, 2.0, 1.5, 1.3, 1.15, 0.8, 0.5, 0.2, 0.0, -0.3, -0.6, -0.85, -1.2])
@@ -43,7 +43,7 @@ pub const DOLLY_SURFACE: Case = Case {
     name: "dolly through a surface",
     about: "the eye sinks through a flat surface, looking along it",
     x: "height of the eye, radii",
-    promised: true,
+    promised: super::BOTH,
     measures: &[NO_NUMBER, COVER, GROWN],
     steps: |extent| extent.of(&[6.0, -3.0], &[12.0, 6.0, 4.0, 3.0, 2.0, 1.5, -1.5, -2.0, -3.0, -5.0, -8.0]),
     run: |rig, settings, steps| {

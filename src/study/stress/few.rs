@@ -11,7 +11,7 @@ pub const NEIGHBOURS: Case = Case {
     name: "neighbours",
     about: "0: no particle, 1: one, 2: two, 3: a row of seven, 4: a sheet of 25, 5: forty at one place, 6: all of these",
     x: "scene",
-    promised: true,
+    promised: &["imai16"],
     measures: &[
         NO_NUMBER,
         HOLES,
@@ -64,7 +64,7 @@ pub const SHEET: Case = Case {
     name: "sheet",
     about: "a sheet of jittered particles, one particle thin, seen at ever flatter angles",
     x: "degrees from its normal",
-    promised: true,
+    promised: super::BOTH,
     measures: &[NO_NUMBER, HOLES],
     steps: |extent| extent.of(&[0.0, 60.0], &[0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 82.0, 86.0]),
     run: |rig, settings, steps| {
@@ -94,7 +94,7 @@ pub const RADIUS: Case = Case {
     name: "radius",
     about: "a block whose particles are said to be larger or smaller than half their spacing",
     x: "radius, of half the spacing",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         HOLES,

@@ -120,7 +120,7 @@ pub const ORBIT: Case = Case {
     name: "orbit",
     about: "liquid that rests, and an eye that goes around it by a tenth of a degree a frame; change after warping by that, beside the truth's",
     x: "frame",
-    promised: true,
+    promised: super::BOTH,
     measures: MEASURES,
     steps: |extent| (0..if extent == super::Extent::Small { 4 } else { 24 }).map(f64::from).collect(),
     run: |rig, settings, steps| {
@@ -137,7 +137,7 @@ pub const DRIFT: Case = Case {
     about: "liquid that moves as a whole by a tenth of a radius a frame, and an eye that rests; change after warping by that, beside the \
             truth's",
     x: "frame",
-    promised: true,
+    promised: super::BOTH,
     measures: MEASURES,
     steps: ORBIT.steps,
     run: |rig, settings, steps| {

@@ -35,7 +35,7 @@ pub const RESOLUTION: Case = Case {
     name: "resolution",
     about: "a body, a ball and drops in more and more pixels, averaged to 80 x 60, beside 640 x 480 of them",
     x: "pixels across, of 80",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         Measure { name: "mean difference, of white", bound: 0.06, beyond: "the liquid looks another at another size" },
@@ -61,7 +61,7 @@ pub const DISTANCE: Case = Case {
     about: "a ball of 12 radii from nearer and farther away",
     x: "distance of the eye, ball radii",
     // The paper's window is of so many pixels, however many radii they cover; `projected` ones keep the shape.
-    promised: false,
+    promised: &["field"],
     measures: &[
         NO_NUMBER,
         Measure {
@@ -100,7 +100,7 @@ pub const OFFSET: Case = Case {
     name: "offset",
     about: "the same particles and camera, as far from the origin as single precision still tells their places apart",
     x: "radii from the origin",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         Measure {
@@ -133,7 +133,7 @@ pub const SHUFFLED: Case = Case {
     name: "shuffled",
     about: "the same particles, shuffled from frame to frame",
     x: "shuffles",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         Measure { name: "pixels that differ", bound: 0.0, beyond: "the picture depends on the order of particles" },

@@ -40,7 +40,7 @@ pub const SEARCH: Case = Case {
     name: "search",
     about: "random clouds: where walks end, beside a slow march and bisection in the same maps or field",
     x: "cloud",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         Measure {
@@ -69,7 +69,7 @@ pub const RESIDUALS: Case = Case {
     name: "residuals",
     about: "the same of all clouds as a histogram: of each angle, how many walks end that far off, but further than the angle before",
     x: "degrees off, at most",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         Measure { name: "walks, %", bound: f64::INFINITY, beyond: "" },

@@ -16,7 +16,7 @@ pub const INTERFACES: Case = Case {
     about: "slabs in a row, 8 radii thick and 16 apart; at odd numbers of interfaces the eye is in the first",
     x: "interfaces in a row",
     // Two volumes are all that screen-space maps know.
-    promised: false,
+    promised: &[],
     measures: &[
         NO_NUMBER,
         Measure {
@@ -66,7 +66,7 @@ pub const THRESHOLD: Case = Case {
     name: "threshold",
     about: "a clump of 64 particles grows apart by a hundredth of its spacing a frame, until all are splash",
     x: "spacing, of that at rest",
-    promised: true,
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         Measure {
