@@ -11,7 +11,7 @@
 #define WALL_TILE 8
 #define WALL_TILE_BITS 3
 // Edge of a tile of the view that is drawn with a walk or without, in pixels.
-#define VIEW_TILE 8
+#define VIEW_TILE 16
 // Depth of what is not there.
 #define FARTHEST 1.0e30
 
@@ -56,7 +56,7 @@
 // Culling: particles that cover more pixels than this along an edge are always drawn and hide nothing.
 #define LARGE 64
 // Tiles of the view that one particle marks one by one, at most.
-#define MOST_TILES 256
+#define MOST_TILES 64
 // Room for the rounding of a ray cast's discriminant, which is of order one. Compilers may round the same formula
 // differently in different shaders.
 #define SILHOUETTE 0.0001

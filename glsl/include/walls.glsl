@@ -186,18 +186,22 @@ struct Bracket {
     bool own; // false: it has not been on its own side yet, and a is where it still counts as there
 };
 
+// |g| at a ray's start, with a minus where the front's term is the larger there.
+float start_of(vec2 first) { return side_of(first) == SIDE_FRONT ? -abs(g_of(first)) : abs(g_of(first)); }
+
 // Whether a ray that is a little on the other side of the front or back on which it has just started counts as on its own all the
 // same: a map's depths and its normals do not put a surface at quite the same place. f is g inside and -g outside, of these terms;
-// `first` are those at the ray's start.
-bool overlooked(float f, vec2 terms, vec2 first, float s, float pixel, float d) {
-    bool started = s < START_PIXELS * pixel && abs(g_of(first)) <= accepted_at(d);
-    return started && side_of(terms) == side_of(first) && f >= 0.0 && f <= start_accepted_at(d);
+// `start` is of the ray's.
+bool overlooked(float f, vec2 terms, float start, float s, float pixel, float d) {
+    bool started = s < START_PIXELS * pixel && abs(start) <= accepted_at(d);
+    return started && (side_of(terms) == SIDE_FRONT) == (floatBitsToInt(start) < 0) && f >= 0.0 && f <= start_accepted_at(d);
 }
 
 // Samples g pixel by pixel from s on, until the ray has changed sides. Else s is where it is clear of the body's walls again
 // beyond `alarmed`, or 1.
 bool find_bracket(ScreenLine line, bool inside, float pixel, float alarmed, vec2 first, inout float s, out Bracket k) {
-    float sign_of_side = inside ? 1.0 : -1.0, at = clamp(0.5 * (s + alarmed), min(0.5 * pixel, 1.0), 1.0), back = pixel;
+    float sign_of_side = inside ? 1.0 : -1.0, start = start_of(first), back = pixel;
+    float at = clamp(0.5 * (s + alarmed), min(0.5 * pixel, 1.0), 1.0);
     vec2 along = line.end - line.start;
     k = Bracket(0.0, 0.0, first, first, false);
     // Further on, the pixels' own depths may have noticed the wall late.
@@ -206,7 +210,7 @@ bool find_bracket(ScreenLine line, bool inside, float pixel, float alarmed, vec2
         float d = depth_at(line, at);
         Body body = body_at(line.start + at * along, d);
         float f = sign_of_side * g_of(body.terms);
-        bool beside = overlooked(f, body.terms, first, at, pixel, d);
+        bool beside = overlooked(f, body.terms, start, at, pixel, d);
         // On the far side of a thin body the other term is the larger.
         bool across = !inside && known && g_of(k.at_a) < HOLE && g_of(body.terms) < HOLE && side_of(body.terms) != side_of(k.at_a);
         if (beside || (f < 0.0 && !across)) {
@@ -237,8 +241,9 @@ bool find_bracket(ScreenLine line, bool inside, float pixel, float alarmed, vec2
 
 // Narrows a bracket, by regula falsi (Illinois) and every other step a halving, around a root of the term of g that is the larger at
 // its outer end: `side`. A ray that has not been on its side yet started at a root, which is not the one that is looked for.
-void narrow(ScreenLine line, bool inside, float pixel, int side, vec2 first, inout Bracket k) {
-    float sign_of_side = inside ? 1.0 : -1.0, kept = 0.0;
+void narrow(ScreenLine line, bool inside, float pixel, int side, float start, inout Bracket k) {
+    float sign_of_side = inside ? 1.0 : -1.0;
+    bool kept_a = false, kept_b = false; // which end the last step left where it was
     float fa = min(sign_of_side * k.at_a[side], -1e-6), fb = max(sign_of_side * k.at_b[side], 1e-6);
     vec2 along = line.end - line.start;
     bool done = false;
@@ -247,29 +252,31 @@ void narrow(ScreenLine line, bool inside, float pixel, int side, vec2 first, ino
         float at = halve ? 0.5 * (k.a + k.b) : k.b - fb * (k.b - k.a) / (fb - fa), d = depth_at(line, at);
         Body body = body_at(line.start + at * along, d);
         float f = sign_of_side * body.terms[side];
-        if (f < 0.0 || (!k.own && overlooked(f, body.terms, first, at, pixel, d))) {
+        if (f < 0.0 || (!k.own && overlooked(f, body.terms, start, at, pixel, d))) {
             k.own = k.own || f < 0.0;
             k.a = at;
             k.at_a = body.terms;
             fa = min(f, -1e-6);
-            if (kept < 0.0) fb *= 0.5;
-            kept = -1.0;
+            if (kept_b) fb *= 0.5;
+            kept_b = true;
+            kept_a = false;
         } else {
             k.b = at;
             k.at_b = body.terms;
             fb = f;
-            if (kept > 0.0) fa *= 0.5;
-            kept = 1.0;
+            if (kept_a) fa *= 0.5;
+            kept_a = true;
+            kept_b = false;
         }
         done = (k.own && abs(f) <= max(CONVERGED, CONVERGED_DEPTH * d)) || k.b - k.a <= min(1e-3 * pixel, 1e-6);
     }
 }
 
 // The wall in a bracket.
-Wall body_wall(Ray ray, ScreenLine line, bool inside, vec2 first, Bracket k) {
+Wall body_wall(Ray ray, ScreenLine line, bool inside, float start, Bracket k) {
     float pixel = 1.0 / max(ray.span, 1e-6);
     int side = side_of(inside ? k.at_b : k.at_a);
-    narrow(line, inside, pixel, side, first, k);
+    narrow(line, inside, pixel, side, start, k);
     // The line through both ends, if one is near the surface; else the end that is, or the middle.
     float d = depth_at(line, k.b), accepted = k.own ? accepted_at(d) : start_accepted_at(d);
     float ga = k.at_a[side], gb = k.at_b[side];
@@ -300,33 +307,35 @@ Wall body_wall(Ray ray, ScreenLine line, bool inside, vec2 first, Bracket k) {
 // The first wall that a ray inside the body, or outside of all liquid, meets. Without one the outcome says why.
 bool find_wall(Ray ray, bool inside, out Wall wall, out int outcome) {
     ScreenLine line = screen_line(ray);
-    float nudge = PIXEL_NUDGE / max(ray.span, 1e-6), s = 0.0, t_ball = HOLE;
+    float nudge = PIXEL_NUDGE / max(ray.span, 1e-6), s = 0.0, s_ball = -1.0; // where it comes into a pixel of a ball that it meets
     vec2 first = vec2(HOLE);
     if (HAS_BODY) first = body_at(line.start, depth_at(line, 0.0)).terms;
     Bracket k;
-    ivec2 ball_pixel = ivec2(0);
     bool crosses = false;
-    for (int i = 0; i < WALL_TRIES && !crosses && t_ball == HOLE && s < 1.0; ++i) {
+    for (int i = 0; i < WALL_TRIES && !crosses && s_ball < 0.0 && s < 1.0; ++i) {
         Stop stop = skip(line, inside, nudge, s);
         s = stop.s;
         if (HAS_SPLASH && stop.meets.y && s < 1.0) {
             vec2 t;
-            ball_pixel = stop.pixel;
-            if (meets_ball(ball_at(stop.pixel, stop.splash), ray.origin, ray.dir, t) && t.x > 1e-4) t_ball = t.x;
+            if (meets_ball(ball_at(stop.pixel, stop.splash), ray.origin, ray.dir, t) && t.x > 1e-4) s_ball = s;
         }
         if (HAS_BODY && stop.meets.x && s < 1.0) crosses = find_bracket(line, inside, 1.0 / max(ray.span, 1e-6), stop.end, first, s, k);
         else s = stop.end;
     }
     outcome = OUTCOME_NOT_CONVERGED;
     wall = Wall(ray.reach, vec3(0.0), CLASS_BODY, false, vec2(0.0), Ball(vec3(0.0), 0.0));
-    if (!crosses && t_ball == HOLE) {
+    if (!crosses && s_ball < 0.0) {
         if (s >= 1.0) outcome = ray.leaves_view ? OUTCOME_LEFT_VIEW : (inside ? OUTCOME_NO_WALL : OUTCOME_HIT);
         return false;
     }
-    if (crosses) wall = body_wall(ray, line, inside, first, k);
-    if (HAS_SPLASH && t_ball < (crosses ? wall.t : HOLE)) {
-        Ball ball = ball_at(ball_pixel, walls_at(ball_pixel).zw);
-        wall = Wall(t_ball, normalize(ray.origin + t_ball * ray.dir - ball.center), CLASS_SPLASH, false, vec2(0.0), ball);
+    if (crosses) wall = body_wall(ray, line, inside, start_of(first), k);
+    if (HAS_SPLASH && s_ball >= 0.0) {
+        ivec2 pixel = pixel_after(line, s_ball, nudge);
+        Ball ball = ball_at(pixel, walls_at(pixel).zw);
+        vec2 t;
+        meets_ball(ball, ray.origin, ray.dir, t);
+        if (!crosses || t.x < wall.t)
+            wall = Wall(t.x, normalize(ray.origin + t.x * ray.dir - ball.center), CLASS_SPLASH, false, vec2(0.0), ball);
     }
     return true;
 }
