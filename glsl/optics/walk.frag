@@ -187,11 +187,14 @@ void main() {
     bool inside;
     float depth = first_surface(pixel, first, inside);
     Walk w = Walk(depth * v, dir, vec3(0.0), vec3(1.0), 0.0, 0.0, 0.0, AIR, Ball(vec3(0.0), 1.0), -1, OUTCOME_HIT, 0u, 0u, false, pixel);
-    if (depth <= 0.0 || scene_hides(pixel, depth)) {
-        if (HOST_BACKGROUND) discard;
+    bool nothing = depth <= 0.0 || scene_hides(pixel, depth);
+    if (nothing && HOST_BACKGROUND) discard;
+#ifdef SCENE
+    if (nothing) {
         write_pixel(behind(pixel, dir), PATTERN_NONE, OUTCOME_NO_LIQUID, w);
         return;
     }
+#endif
 
     Wall wall = Wall(0.0, vec3(0.0), first, false, vec2(0.0), w.ball);
     if (first == CLASS_SPLASH) {
@@ -208,7 +211,7 @@ void main() {
     }
     const uint volumes = REFRACTIONS == 1 ? 1u : REFRACTIONS / 2u, most = REFRACTIONS + INTERNAL_REFLECTIONS + uint(MOST_HAND_OVERS);
     // Where nothing is to be met: inside at the start, or from one class to the other.
-    bool straight = inside, done = false;
+    bool straight = inside, done = nothing; // without a scene the same look-up serves rays that meet nothing
     for (uint i = 0u; i < most && !done; ++i) {
         if (!straight) meet(w, wall);
         done = REFRACTIONS == 1 || w.outcome != OUTCOME_HIT || (w.within == AIR && w.volumes == volumes);
@@ -227,5 +230,9 @@ void main() {
 #endif
     w.color += w.light * background(w.x, w.dir);
     int pattern = w.second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + w.second;
+    if (nothing) {
+        pattern = PATTERN_NONE;
+        outcome = OUTCOME_NO_LIQUID;
+    }
     write_pixel(w.color, pattern, outcome, w);
 }
