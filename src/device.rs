@@ -61,6 +61,7 @@ const FORMATS: &[(vk::Format, vk::FormatFeatureFlags, &str)] = &[
     (vk::Format::R32_UINT, MAP_FEATURES, "R32_UINT as colour attachment, sampled and storage image"),
     (vk::Format::D32_SFLOAT, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT, "D32_SFLOAT as depth attachment"),
     (vk::Format::R32G32B32A32_SFLOAT, vk::FormatFeatureFlags::SAMPLED_IMAGE, "R32G32B32A32_SFLOAT as sampled image"),
+    (vk::Format::R32G32B32A32_UINT, vk::FormatFeatureFlags::SAMPLED_IMAGE, "R32G32B32A32_UINT as sampled image"),
 ];
 const MAP_FEATURES: vk::FormatFeatureFlags = vk::FormatFeatureFlags::from_raw(
     vk::FormatFeatureFlags::COLOR_ATTACHMENT.as_raw()

@@ -1,5 +1,7 @@
 //! Environment maps: what is infinitely far away.
 
+pub(crate) mod footprints;
+
 use crate::Error;
 use glam::Vec3;
 
@@ -11,6 +13,8 @@ pub struct Equirect {
     height: u32,
     /// RGBA, row by row.
     texels: Vec<f32>,
+    /// The largest of red, green and blue in all of it.
+    largest: f32,
 }
 
 impl Equirect {
@@ -39,6 +43,11 @@ impl Equirect {
     /// RGBA texels, row by row.
     pub fn texels(&self) -> &[f32] {
         &self.texels
+    }
+
+    /// The largest value of red, green and blue in all of the map.
+    pub fn largest(&self) -> f32 {
+        self.largest
     }
 
     /// A sky for those who have no map: a clear afternoon over a tiled floor that fades into haze, so that
@@ -110,7 +119,7 @@ impl EquirectBuilder {
         let scale = ((f64::from(w) / f64::from(width)) * (f64::from(h) / f64::from(height))) as f32;
         Ok(EquirectBuilder {
             size: [width, height],
-            map: Equirect { width: w, height: h, texels },
+            map: Equirect { width: w, height: h, texels, largest: 0.0 },
             columns: Share::all(width, w),
             rows: Share::all(height, h),
             scale,
@@ -160,6 +169,7 @@ impl EquirectBuilder {
         for texel in self.map.texels.as_chunks_mut::<4>().0 {
             // Rounding may take the mean of the brightest values there are beyond them.
             texel[..3].iter_mut().for_each(|v| *v = v.min(f32::MAX));
+            self.map.largest = texel[..3].iter().copied().fold(self.map.largest, f32::max);
             texel[3] = 1.0;
         }
         self.map

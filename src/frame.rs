@@ -94,7 +94,8 @@ pub(crate) struct Scene<'a> {
     /// Preparation on the device, if the frame starts from positions there.
     pub prepare: Option<Preparation>,
     pub has_scene: bool,
-    pub environment: EnvironmentShape,
+    /// How the host's own environment maps directions; `None` for the renderer's.
+    pub environment: Option<EnvironmentShape>,
     pub background: Background,
     pub output: vk::Format,
     /// World to eye.
@@ -148,7 +149,7 @@ impl<'a> Scene<'a> {
             body: body > 0,
             prepare: None,
             has_scene: false,
-            environment: EnvironmentShape::Equirect,
+            environment: None,
             background: Background::Environment,
             output: vk::Format::R32G32B32A32_SFLOAT,
             eye: Mat4::IDENTITY,

@@ -28,6 +28,7 @@ pub(crate) struct Externals {
     pub speeds: vk::Buffer,
     /// What a density field is made of, where the host said so.
     pub points: vk::Buffer,
+    /// The host's, or the renderer's own.
     pub environment: (vk::ImageView, vk::ImageLayout),
     pub scene: Option<SceneInput>,
     pub output: vk::ImageView,
@@ -322,7 +323,7 @@ impl Recorder<'_> {
     fn view(&self, target: Target, access: Access) -> Result<(vk::ImageView, vk::ImageLayout), Error> {
         let absent = || absent("recording", self.plan.resource(target).name);
         match self.plan.resource(target).made {
-            Made::Given(External::Environment) => Ok(self.externals.environment),
+            Made::Given(External::Environment | External::Footprints) => Ok(self.externals.environment),
             Made::Given(External::SceneColor) => {
                 self.externals.scene.map(|s| (s.color, s.color_layout)).ok_or_else(absent)
             }

@@ -7,13 +7,13 @@ use crate::{
     Error, access,
     device::{self, Host, Limits},
     frame::{self, Kept, Preparation, Scene},
-    input::{EnvironmentInput, EnvironmentShape, FrameInput},
+    input::FrameInput,
     pipeline::Pipelines,
     plan::{Home, Made, Plan},
     prepare::{self, DevicePositions},
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder},
-    resources::{Buffer, Image, Resource, Retired, Spec},
+    resources::{Buffer, Resource, Retired, Spec},
     scale::Scale,
     slot::Slot,
     space::{self, Space},
@@ -23,6 +23,7 @@ pub use ahead::Amount;
 use ahead::check_memory;
 use ash::vk;
 use glam::Vec3;
+use uploads::Footprints;
 
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
 ///
@@ -47,7 +48,7 @@ pub struct Renderer {
     /// What a density field is made of.
     points: Option<Buffer>,
     scene: SceneBounds,
-    environment: Option<Image>,
+    environment: Option<Footprints>,
     pub(crate) barriers: Vec<PlanEntry>,
     /// What is also written, for dumps and statistics.
     #[cfg(feature = "inspect")]
@@ -169,7 +170,7 @@ impl Renderer {
         let size = self.size.map(|s| s.max(1));
         let mut scene = Scene::new(input.settings, size, [self.scene.splash, self.scene.body], &self.limits);
         (scene.output, scene.background) = (self.output, input.background);
-        scene.environment = input.environment.map_or(EnvironmentShape::Equirect, |e| e.shape);
+        scene.environment = input.environment.map(|e| e.shape);
         (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
         scene.space = input.positions.map_or(self.scene.space, |p| Space::new(p.radius, Vec3::ZERO));
         if let Some(p) = &input.positions {
@@ -245,12 +246,10 @@ impl Renderer {
         if self.size == [0, 0] {
             return Err(Error::Order("no size yet: call Renderer::resize first"));
         }
-        let own = self.environment.as_ref().map(|i| EnvironmentInput {
-            view: i.view,
-            layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
-            shape: EnvironmentShape::Equirect,
-        });
-        let Some(environment) = input.environment.or(own) else {
+        let own = self.environment.as_ref();
+        let given = input.environment.map(|e| (e.view, e.layout));
+        let uploaded = own.map(|e| (e.image.view, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL));
+        let Some(environment) = given.or(uploaded) else {
             return Err(Error::Order(
                 "no environment yet: give FrameInput::environment, or call Renderer::set_environment first \
                  (Equirect::procedural_sky needs no file)",
@@ -275,6 +274,9 @@ impl Renderer {
         self.check_speeds(&scene)?;
         self.check_points(&scene)?;
         let mut block = input.camera.uniforms(input.settings, self.size, &space, bounds);
+        if let Some(own) = own {
+            own.describe(&mut block);
+        }
         if let Some(p) = &input.positions {
             // In the preparation's units; the extent pass moves the origin and goes on to radii.
             let shift = input.camera.view.w_axis.truncate() * space::power_of_two(p.radius);
@@ -341,7 +343,7 @@ impl Renderer {
             particles: particles.map_or([vk::Buffer::null(); 3], |b| b.each_ref().map(|b| b.handle)),
             speeds: self.speeds.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
             points: self.points.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
-            environment: (environment.view, environment.layout),
+            environment,
             scene: input.scene,
             output: input.output,
         };
@@ -413,8 +415,8 @@ impl Renderer {
         self.retired.collect(&self.host, u64::MAX);
         let given = self.particles.take().into_iter().flatten().chain(self.speeds.take()).chain(self.points.take());
         given.for_each(|mut b| b.destroy(&self.host));
-        if let Some(mut i) = self.environment.take() {
-            i.destroy(&self.host);
+        if let Some(mut own) = self.environment.take() {
+            own.image.destroy(&self.host);
         }
         self.slots.drain(..).for_each(|mut slot| slot.destroy(&self.host));
         self.pipelines.destroy(&self.host);

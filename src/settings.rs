@@ -175,8 +175,8 @@ impl Camera {
     }
 
     /// The uniform block of a frame, as shaders and twins read it: lengths in particle radii, positions in the liquid's
-    /// own [`Space`]. `size` in pixels, `bounds` (the box around the liquid) in world units. Host scene and particle counts
-    /// are left zero.
+    /// own [`Space`]. `size` in pixels, `bounds` (the box around the liquid) in world units. Host scene, environment map and
+    /// particle counts are left zero.
     pub(crate) fn uniforms(&self, settings: &Settings, size: [u32; 2], space: &Space, bounds: (Vec3, Vec3)) -> Frame {
         let radius = space.radius as f32;
         let view = space.view(self.view);

@@ -200,6 +200,10 @@ struct Frame {
     float scene_z_offset; // the projection's element (3, 4), over the radius
     float scene_cleared;  // value of the depth buffer where nothing was drawn
     uint quads_only;      // 1 to draw no points
+    // The renderer's own environment map (environment.glsl): texels a radian,
+    vec2 environment_per_radian;
+    float environment_columns;
+    float environment_scale; // and the light of a step of the largest exponent
 };
 
 // Indirect draws of one class and side, two VkDrawIndirectCommand: one of points and one of quads.

@@ -4,10 +4,10 @@
 #[cfg(feature = "inspect")]
 pub mod twin;
 
-use super::{Fresnel, Optics};
+use super::{Fresnel, Optics, environment};
 use crate::{
     frame::Scene,
-    input::{Background, EnvironmentShape},
+    input::Background,
     layers::Surfaces,
     plan::{Call, External, Plan, Rendering, Vertices},
     shader::{LOOKUP_BENT, LOOKUP_FRAG, LOOKUP_INDEX, LOOKUP_NORMAL, VIEW_VERT},
@@ -61,17 +61,16 @@ impl Lookup {
     /// Draws the picture; without liquid only what is behind it.
     pub(super) fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
         let body = surfaces.body.unwrap_or_else(|| super::walk::placeholder(plan));
-        let (cube, thickness) = (scene.environment == EnvironmentShape::Cube, surfaces.thickness);
+        let (cube, thickness) = (environment::is_cube(scene), surfaces.thickness);
         let given = [scene.has_scene, cube, thickness.is_some(), surfaces.speed.is_some()];
         let variant = given.into_iter().enumerate().map(|(i, given)| usize::from(given) << i).sum::<usize>();
         let light = self.light.as_dvec3().normalize_or_zero().as_vec3();
         let light = scene.eye.transform_vector3(light);
         let [diffuse, specular, shininess] = self.phong;
         let [spray, spray_speed] = self.spray;
-        let mut call = Call::draw(&VIEW_VERT, &LOOKUP_FRAG[variant])
+        let call = Call::draw(&VIEW_VERT, &LOOKUP_FRAG[variant])
             .read("body_depth", body.depth)
             .read("body_normal", body.normal)
-            .read("environment", plan.given(External::Environment))
             .constant("MODE", self.mode as u32)
             .constant("EXACT_FRESNEL", self.fresnel == Fresnel::Exact)
             .constant("ENCODE_SRGB", scene.encode_srgb())
@@ -88,6 +87,7 @@ impl Lookup {
             .push("shininess", shininess)
             .push("spray", spray)
             .push("spray_speed", spray_speed);
+        let mut call = environment::seen_by(plan, scene, call);
         if let Some(thickness) = thickness {
             call = call.read("thickness", thickness);
         }

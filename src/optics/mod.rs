@@ -1,5 +1,6 @@
 //! How light goes through the liquid's surfaces.
 
+mod environment;
 mod field_walk;
 pub mod four;
 pub mod instant_liquids;

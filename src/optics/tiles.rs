@@ -1,7 +1,7 @@
 //! The view by tiles: what light does in those that may have liquid is drawn there alone, and what is seen past the liquid in the
 //! others (`glsl/optics/tiles.vert`, `tiles.frag`).
 
-use super::walk::variant;
+use super::{environment, walk::variant};
 use crate::{
     frame::Scene,
     input::Background,
@@ -57,7 +57,7 @@ pub(super) fn past(plan: &mut Plan, scene: &Scene, tiles: Option<&Tiles>) -> Opt
         Some(tiles) => tiles.draw(plan, scene, fragment, true),
         None => (Call::draw(&VIEW_VERT, fragment), Vertices::Direct(3)),
     };
-    let call = call.read("environment", plan.given(External::Environment)).constant("ENCODE_SRGB", scene.encode_srgb());
+    let call = environment::seen_by(plan, scene, call).constant("ENCODE_SRGB", scene.encode_srgb());
     Some((with_scene(plan, scene, call), vertices))
 }
 

@@ -1,13 +1,13 @@
 //! The walk of each view ray through the liquid, and its colour (`glsl/optics/walk.frag`; Imai16 §4.4, §4.5).
 
 use super::{
-    Fresnel, field_walk,
+    Fresnel, environment, field_walk,
     tiles::{self, Tiles},
     walls,
 };
 use crate::{
     frame::Scene,
-    input::{Background, EnvironmentShape},
+    input::Background,
     layers::{Surface, Surfaces},
     plan::{Call, External, Plan, Rendering, Target, Vertices},
     resources::ImageSpec,
@@ -77,8 +77,7 @@ impl Walk {
 
     /// What becomes of light on the way, and what it brings back.
     fn light(&self, plan: &mut Plan, scene: &Scene, call: Call) -> Call {
-        let call = call
-            .read("environment", plan.given(External::Environment))
+        let call = environment::seen_by(plan, scene, call)
             .constant("ENCODE_SRGB", scene.encode_srgb())
             .constant("HOST_BACKGROUND", scene.background == Background::Host)
             .constant("REFRACTIONS", self.refractions)
@@ -114,7 +113,7 @@ impl Walk {
 
 /// Which of a walk's shaders.
 pub(super) fn variant(scene: &Scene) -> usize {
-    let cube = scene.environment == EnvironmentShape::Cube;
+    let cube = environment::is_cube(scene);
     usize::from(scene.walks) + 2 * usize::from(scene.has_scene) + 4 * usize::from(cube)
 }
 

@@ -311,7 +311,7 @@ impl Call {
 
 /// Whether a format of a target holds unsigned integers; the others hold floats.
 fn is_uint(format: vk::Format) -> bool {
-    format == vk::Format::R32_UINT
+    matches!(format, vk::Format::R32_UINT | vk::Format::R32G32B32A32_UINT)
 }
 
 /// Whether a resource is of the kind that the shader has at this binding.
@@ -331,6 +331,7 @@ fn fits(plan: &Plan, b: &Binding, target: Target) -> Result<(), String> {
         }
         (Some(texels), Made::Given(External::SceneColor | External::SceneDepth)) => !texels.uint && !texels.cube,
         (Some(texels), Made::Given(External::Environment)) => !texels.uint,
+        (Some(texels), Made::Given(External::Footprints)) => texels.uint && !texels.array && !texels.cube,
         (None, Made::Own(Spec::Buffer { .. })) => true,
         (None, Made::Given(given)) if b.kind != Kind::TexelBuffer => {
             use External::{Centers, Diagonals, FrameBlock, Ids, Mixed, Points, Positions, Speeds};

@@ -46,7 +46,10 @@ pub(crate) enum External {
     Mixed,
     Speeds,
     Points,
+    /// The host's.
     Environment,
+    /// The renderer's own.
+    Footprints,
     SceneColor,
     SceneDepth,
     Output(vk::Format),

@@ -55,13 +55,13 @@ impl Renderer {
         ledger.extend(particles.map(|(name, b)| entry(name, b.bytes, true)));
         ledger.extend(self.speeds.iter().map(|b| entry(SPEEDS, b.bytes, true)));
         ledger.extend(self.points.iter().map(|b| entry(POINTS, b.bytes, true)));
-        ledger.extend(self.environment.iter().map(|i| entry("environment", i.bytes, false)));
+        ledger.extend(self.environment.iter().map(|own| entry("environment", own.image.bytes, false)));
         ledger
     }
 
     /// Compiles, on all cores, whatever frames with these settings can need, so that recording them compiles nothing:
     /// with particles of either class, of both or of none, prepared on the host or on the device, with and without a scene,
-    /// before either background, in either shape of environment. Says how many pipelines were made; those that were there
+    /// before either background, in its own environment and the host's of either shape. Says how many pipelines were made; those that were there
     /// already count for nothing. To be called after [`Renderer::resize`], when there is time: at loading, say.
     ///
     /// That is dozens of pipelines; [`Renderer::warm_up_like`] makes those of one kind of frame. Without either, what a
@@ -78,7 +78,7 @@ impl Renderer {
         for classes in [[0, 0], [1, 0], [0, 1], [1, 1]] {
             for has_scene in [false, true] {
                 for background in [Background::Environment, Background::Host] {
-                    for environment in [EnvironmentShape::Equirect, EnvironmentShape::Cube] {
+                    for environment in [None, Some(EnvironmentShape::Equirect), Some(EnvironmentShape::Cube)] {
                         scenes.push(Scene { has_scene, background, environment, ..scene(classes) });
                     }
                 }

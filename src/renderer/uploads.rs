@@ -3,17 +3,19 @@
 use super::{Renderer, SceneBounds};
 use crate::{
     Error, access,
-    environment::Equirect,
+    environment::{Equirect, footprints},
     frame::Scene,
     layers::{Kind, field::MOST_POINTS},
     particles::{Class, Particles, Point},
     prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},
+    shader,
     space::{self, Space},
 };
 use ash::vk;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use gpu_allocator::MemoryLocation;
+use std::f32::consts::{PI, TAU};
 
 impl Renderer {
     /// Gives the particles of the frames to come. The host's memory is copied; the last particles are kept until the
@@ -172,13 +174,12 @@ impl Renderer {
                 format!("use at most {} pixels each way", self.limits.image_size),
             ));
         }
-        let bytes: &[u8] = bytemuck::cast_slice(map.texels());
         let usage = vk::BufferUsageFlags::TRANSFER_SRC;
-        let mut staging =
-            Buffer::new(&self.host, "environment staging", bytes.len() as u64, usage, MemoryLocation::CpuToGpu)?;
-        staging.mapped()[..bytes.len()].copy_from_slice(bytes);
+        let bytes = footprints::BYTES * u64::from(size[0]) * u64::from(size[1]);
+        let mut staging = Buffer::new(&self.host, "environment staging", bytes, usage, MemoryLocation::CpuToGpu)?;
+        let scale = footprints::write(map, &mut staging.mapped()[..bytes as usize]);
         let spec = ImageSpec {
-            format: vk::Format::R32G32B32A32_SFLOAT,
+            format: vk::Format::R32G32B32A32_UINT,
             size,
             layers: 1,
             array: false,
@@ -212,10 +213,27 @@ impl Renderer {
             }
         }
         self.retire(Resource::Buffer(staging));
-        if let Some(old) = self.environment.replace(image) {
-            self.retire(Resource::Image(old));
+        if let Some(old) = self.environment.replace(Footprints { image, size, scale }) {
+            self.retire(Resource::Image(old.image));
         }
         Ok(())
+    }
+}
+
+/// The environment as it was uploaded.
+pub(super) struct Footprints {
+    pub image: Image,
+    size: [u32; 2],
+    scale: f32,
+}
+
+impl Footprints {
+    /// Tells shaders of it.
+    pub fn describe(&self, block: &mut shader::Frame) {
+        let [columns, rows] = self.size.map(|n| n as f32);
+        block.environment_per_radian = Vec2::new(columns / TAU, rows / PI);
+        block.environment_columns = columns;
+        block.environment_scale = self.scale;
     }
 }
 

@@ -52,7 +52,7 @@ impl<'a> View<'a> {
         -(self.turn.inverse() * (point - self.eye)).z
     }
 
-    /// Linear light from a world direction.
+    /// Linear light from a world direction, of a map rounded as the renderer's is: what the two see differ in is not the map.
     pub fn environment(&self, dir: DVec3) -> DVec3 {
         env_color(self.map, self.to_environment * dir).as_dvec3()
     }

@@ -85,8 +85,22 @@ impl Maps<'_> {
     }
 }
 
+/// A texel as shaders have it, of a map whose largest value is this: red, green and blue are multiples of a common power of two,
+/// fewer than 512 of it.
+fn rounded(rgb: DVec3, largest: f64) -> Vec3 {
+    // The largest of the three fills nine bits, before rounding and after.
+    let step = |largest: f64| {
+        let step = (largest.log2().floor() - 8.0).exp2();
+        if (largest / step).round() < 512.0 { step } else { 2.0 * step }
+    };
+    // Of exponents there are 32. In f32's last octave 511 of them are the most that is finite.
+    let top = step(largest.max(f64::MIN_POSITIVE)).min(119f64.exp2());
+    let step = step(rgb.max_element().max(f64::MIN_POSITIVE)).clamp(31f64.exp2().recip() * top, top);
+    ((rgb / step).round().min(DVec3::splat(511.0)) * step).as_vec3()
+}
+
 /// Light from a direction of the environment map's own space (+y up), bilinear; columns wrap around, rows end at the
-/// poles.
+/// poles. Texels are rounded as those are that the renderer uploads (`src/environment/footprints.rs`).
 pub fn env_color(map: &Equirect, dir: DVec3) -> Vec3 {
     let [width, height] = map.size().map(|n| n as usize);
     // Column 0 at atan2(z, x) = -π, row 0 straight up; texel centres at +0.5.
@@ -96,7 +110,7 @@ pub fn env_color(map: &Equirect, dir: DVec3) -> Vec3 {
         let x = x.rem_euclid(width as f64) as usize % width;
         let y = y.clamp(0.0, height as f64 - 1.0) as usize;
         let rgba = &map.texels()[4 * (y * width + x)..];
-        Vec3::new(rgba[0], rgba[1], rgba[2])
+        rounded(DVec3::new(rgba[0].into(), rgba[1].into(), rgba[2].into()), map.largest().into())
     };
     let (x, y) = (column.floor(), row.floor());
     let (fx, fy) = ((column - x) as f32, (row - y) as f32);

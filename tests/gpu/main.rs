@@ -11,6 +11,7 @@ mod classes;
 mod compact;
 mod cull;
 mod drivers;
+mod environment;
 mod extent;
 mod field;
 mod field_walk;
