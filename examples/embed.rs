@@ -120,6 +120,7 @@ fn main() -> Result<()> {
         let positions = positions();
         let input = prepare::Input::new(&positions, RADIUS);
         renderer.set_particles(&prepare::prepare(&input, &Default::default())?.0)?;
+        renderer.set_points(&prepare::points(&input, &Default::default())?)?;
         let mut settings = Settings::default();
         settings.liquid.absorption = Vec3::new(0.9, 0.3, 0.15);
         // At loading time: frames with these settings compile nothing.

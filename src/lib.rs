@@ -30,7 +30,8 @@
 //! * The environment is a map given once ([`Renderer::set_environment`]) or an image view of the host's
 //!   ([`EnvironmentInput`]), equirectangular or a cube.
 //! * Left-handed worlds, viewports of negative height, reversed and infinite depth: see [`Camera`].
-//! * Particles are prepared on the host ([`prepare::prepare`], [`Renderer::set_particles`]) or, frame by frame, on the device
+//! * Particles are prepared on the host ([`prepare::prepare`], [`Renderer::set_particles`]; for a density field, which is the
+//!   default, also [`prepare::points`], [`Renderer::set_points`]) or, frame by frame, on the device
 //!   from positions in a buffer of the host's ([`prepare::DevicePositions`]): then no count ever comes back, and what a
 //!   scene does not need is an indirect draw or dispatch of nothing. Such a buffer, and that of ids
 //!   ([`prepare::DeviceIds`]), is the host's: its writes are visible to reads in compute shaders before the frame, which

@@ -6,6 +6,7 @@ use meniscus::{
     Background, Camera, Equirect, FrameInput, Method, SceneInput, Settings,
     host::{Canvas, Gpu, Instance, Session, Upload},
     inspect::Inspection,
+    layers::split::Split,
     optics::Optics,
     prepare::{self, DevicePositions},
     smooth::plane_fit::PlaneFit,
@@ -145,7 +146,7 @@ fn settings(kind: &Kind) -> Settings {
     let optics = ["one", "two", "", "four"][kind.refractions as usize - 1];
     let optics = Optics::named(optics).expect("one of three");
     let smooth = PlaneFit::default().iterations(kind.iterations);
-    Method::new(Method::default().layers, smooth, optics).into()
+    Method::new(Split::default(), smooth, optics).into()
 }
 
 fn run(gpu: &Gpu, kind: &Kind) -> Endured {

@@ -93,17 +93,20 @@ fn a_dump_replaces_a_dump_and_nothing_else() {
     let run = Run::new();
     let block = run.file("block.csv", block(0.0));
     let all = ["block.csv", "d", "out.png"];
-    run.succeeds(&render(&block, &["-o", "out.png", "--dump", "d"]), &all);
+    fn imai16<'a>(block: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+        render(block, &[&["--method", "imai16"], more].concat())
+    }
+    run.succeeds(&imai16(&block, &["-o", "out.png", "--dump", "d"]), &all);
     let first = listing(&run.path("d"));
     assert!(first.contains(&"body_back_depth.npy".to_owned()));
-    run.succeeds(&render(&block, &["-o", "out.png", "--dump", "d/", "--optics", "one"]), &all);
+    run.succeeds(&imai16(&block, &["-o", "out.png", "--dump", "d/", "--optics", "one"]), &all);
     let second = listing(&run.path("d"));
     assert!(!second.iter().any(|n| n.contains("back")), "maps of the older dump: {second:?}");
     // Parents that are missing are made; an empty folder is as good as none.
-    run.succeeds(&render(&block, &["-o", "out.png", "--dump", "e/f/g"]), &["block.csv", "d", "e", "out.png"]);
+    run.succeeds(&imai16(&block, &["-o", "out.png", "--dump", "e/f/g"]), &["block.csv", "d", "e", "out.png"]);
     assert_eq!(listing(&run.path("e/f/g")), first);
     fs::create_dir(run.path("empty")).expect("folder");
-    let done = run.command(&render(&block, &["-o", "out.png", "--dump", "empty"]));
+    let done = run.command(&imai16(&block, &["-o", "out.png", "--dump", "empty"]));
     assert!(done.status.success() && listing(&run.path("empty")) == first, "{}", text(&done));
     // What a dump does not hold stays where it is.
     let particles = run.path("e/f/g/particles.npz");

@@ -18,7 +18,7 @@ fn the_embedded_scene_renders() {
 fn stats_and_dump_are_complete() {
     let run = Run::new();
     let block = run.file("block.csv", block(0.0));
-    run.render(&[&block, "--stats", "stats.json", "--dump", "dump", "--radius", "0.05"]);
+    run.render(&[&block, "--method", "imai16", "--stats", "stats.json", "--dump", "dump", "--radius", "0.05"]);
     let stats: serde_json::Value = serde_json::from_slice(&fs::read(run.path("stats.json")).unwrap()).unwrap();
     for key in ["device", "particles", "gpu", "memory", "patterns", "outcomes", "guards", "frame"] {
         assert!(!stats[key].is_null(), "stats have no {key}");
@@ -48,7 +48,7 @@ fn stats_and_dump_are_complete() {
     assert_eq!(frame["width"], 96);
     // What was drawn can be drawn again: the dumped particles give the same picture.
     let first = run.pixels("out.png");
-    let said = run.render(&["dump/particles.npz", "--radius", "0.05"]);
+    let said = run.render(&["dump/particles.npz", "--method", "imai16", "--radius", "0.05"]);
     assert!(!said.contains("note:"), "{said}");
     let second = run.pixels("out.png");
     let differ = first.iter().zip(&second).filter(|(a, b)| a.abs_diff(**b) > 2).count();
@@ -99,7 +99,7 @@ fn only_what_a_scene_needs_is_there() {
     let run = Run::new();
     let block = run.file("block.csv", block(0.0));
     let memory = |args: &[&str]| {
-        let mut all = vec![block.as_str(), "--radius", "0.05", "--stats", "stats.json"];
+        let mut all = vec![block.as_str(), "--method", "imai16", "--radius", "0.05", "--stats", "stats.json"];
         all.extend(args);
         run.render(&all);
         let stats: serde_json::Value = serde_json::from_slice(&fs::read(run.path("stats.json")).unwrap()).unwrap();
@@ -212,7 +212,8 @@ fn every_method_is_dumped() {
         (&["--method", "cords08", "--spray", "0.8"][..], &["speed", "body_front_missing_silhouette"][..]),
         (&["--method", "imai14"], &["nearest_and_farthest", "body_back_depth_last_step"]),
         (&["--method", "green10"], &["thickness", "body_front_depth_last_step"]),
-        (&[], &["walls", "body_front_depth_last_step", "body_back_depth"]),
+        (&["--method", "imai16"], &["walls", "body_front_depth_last_step", "body_back_depth"]),
+        (&[], &["field_bricks", "field_held", "final_direction"]),
     ] {
         run.render(&[&[&moving, "--radius", "0.05", "--dump", "d"], args].concat());
         let mut files = listing(&run.path("d"));
@@ -244,7 +245,7 @@ fn dumps_keep_where_the_near_plane_cuts() {
     let block = run.file("block.csv", block(0.0));
     run.render(
         &[
-            &[&block, "--radius", "0.05", "--dump", "d", "--optics", "one"][..],
+            &[&block, "--method", "imai16", "--radius", "0.05", "--dump", "d", "--optics", "one"][..],
             &["--eye", "0.2,0.2,0.2", "--target", "0.2,0.25,1"],
         ]
         .concat(),

@@ -1,7 +1,7 @@
 //! Parameters are described once, in the library: the command line and what it writes follow.
 
 use crate::{Run, block, text};
-use meniscus::{Settings, parameters::Part, prepare};
+use meniscus::{Method, Settings, parameters::Part, prepare};
 use serde_json::{Value, json};
 use std::fs;
 
@@ -41,7 +41,7 @@ fn every_parameter_is_recorded() {
     let run = Run::new();
     let block = run.file("block.csv", block(0.0));
     run.render(&[&block, "--stats", "s.json", "--dump", "d", "--radius", "0.05", "--sigma", "4", "--ior", "1.4"]);
-    let mut settings = Settings::default();
+    let mut settings = Settings::from(Method::preset("imai16").expect("a preset"));
     settings.set("sigma", "4").expect("set");
     settings.set("ior", "1.4").expect("set");
     for frame in [&read(&run, "s.json")["frame"], &read(&run, "d/frame.json")] {

@@ -256,6 +256,6 @@ fn a_chart_goes_on_and_shows_everything() {
     }
     let svg = fs::read_to_string(run.path("out/p.svg")).expect("a chart");
     assert!(svg.contains("imai16") && svg.contains("0 smoothing passes") && svg.contains("isosurface"), "{svg}");
-    run.refused(1, &["chart", &particles, "-o", "x", "--vary", "colour=1"], &["colour", "window"]);
+    run.refused(1, &["chart", &particles, "-o", "x", "--vary", "colour=1"], &["colour", "kernel_radius"]);
     run.refused(2, &["chart", "-o", "x", "--vary", "window"], &["NAME=VALUE"]);
 }

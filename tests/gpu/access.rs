@@ -2,13 +2,13 @@
 
 use crate::{
     drivers::SKY,
-    support::{Choose, camera, each_driver, random_cloud},
+    support::{Choose, camera, each_driver, imai16, random_cloud},
 };
 use ash::vk::{self, AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};
 use glam::Vec3;
+use meniscus::FrameInput;
 use meniscus::host::{Gpu, HostError, Instance, Session};
 use meniscus::inspect::{Access, State};
-use meniscus::{FrameInput, Settings};
 
 /// Every target that a pass reads: the pass, the target, the stage that wrote it, the stage that reads it. Of several
 /// passes that read in the same stage only the first needs a barrier.
@@ -41,7 +41,7 @@ fn a_frame_has_a_barrier_before_every_read() {
         session.renderer.set_particles(&particles).expect("particles");
         let camera = camera(Vec3::new(0.3, 0.4, 2.0), Vec3::ZERO, size);
         // Three iterations: A is read both within the loop and after it.
-        let settings = Settings::default().iterations(3);
+        let settings = imai16().iterations(3);
         let input = FrameInput::new(0, &camera, &settings, vk::ImageView::null());
         let mut plans = Vec::new();
         for _ in 0..4 {

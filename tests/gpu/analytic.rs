@@ -2,7 +2,7 @@
 //! computed here in double precision from the ellipsoids themselves.
 
 use crate::{
-    support::{Case, Choose, Driver, Shot, each_driver, sphere},
+    support::{Case, Choose, Driver, Shot, each_driver, imai16, sphere},
     walk::degrees,
 };
 use glam::{DMat3, DVec3, Mat3, Vec3};
@@ -105,7 +105,7 @@ pub fn case(radius: f32, splash: &[Ellipsoid], body: &[Ellipsoid], camera: Camer
 }
 
 pub fn settings(refractions: u32, internal_reflections: u32) -> Settings {
-    Settings::default().refractions(refractions).reflections(internal_reflections).iterations(0)
+    imai16().refractions(refractions).reflections(internal_reflections).iterations(0)
 }
 
 /// One pixel: where its ray starts and runs in the world (from the camera's matrices alone), and what the GPU found.
@@ -229,7 +229,7 @@ fn tilted_planes_keep_depth_and_normal() {
     for tilt in [0.0f32, 30.0, 60.0, 75.0, 85.0, 89.0] {
         let axes = Mat3::from_rotation_x(-tilt.to_radians()) * Mat3::from_diagonal(Vec3::new(3.0, 3.0, 0.04));
         let body = Ellipsoid { center: Vec3::ZERO, axes };
-        let optics = Settings::default().refractions(1);
+        let optics = imai16().refractions(1);
         let case = case(0.05, &[], &[body], view(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, 8.0), optics);
         let q = Quadric::new(&body);
         each_driver(|driver| {
@@ -304,7 +304,7 @@ fn a_ball_before_a_slab_is_left_by_its_own_back() {
 fn a_ball_on_an_edge_is_not_smoothed() {
     let ball = sphere(Vec3::new(0.5, 0.0, 0.3), 0.15);
     let body = Ellipsoid { center: Vec3::ZERO, axes: Mat3::from_diagonal(Vec3::new(0.5, 0.6, 0.2)) };
-    let smooth = Settings::default().iterations(5);
+    let smooth = imai16().iterations(5);
     let camera = view(Vec3::new(0.2, 0.3, 2.5), Vec3::ZERO, 45.0);
     let cases: [(&[_], &[_]); 3] = [(&[ball], &[body]), (&[ball], &[]), (&[], &[body])];
     let cases = cases.map(|(splash, body)| case(0.15, splash, body, camera, smooth));

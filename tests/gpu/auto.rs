@@ -2,11 +2,11 @@
 
 use crate::{
     drivers::SKY,
-    support::{Choose, camera, each_driver, random_cloud},
+    support::{Choose, camera, each_driver, imai16, random_cloud},
 };
 use glam::Vec3;
 use meniscus::{
-    FrameInput, Method, Settings,
+    FrameInput, Method,
     ash::vk,
     auto::{Auto, Why},
     host::Session,
@@ -24,7 +24,7 @@ fn a_budget_that_nothing_fits_leads_to_the_last_choice() {
         let camera = camera(Vec3::new(2.0, 3.0, 18.0), Vec3::ZERO, size);
         let choices = ["imai16", "imai14", "green10"].map(|n| (n, Method::preset(n).expect("it is published")));
         let mut auto = Auto::new(1e-6, choices).expect("valid");
-        let mut settings = Settings::default().refractions(4);
+        let mut settings = imai16().refractions(4);
         let input = FrameInput::new(0, &camera, &settings, vk::ImageView::null());
         let made = auto.warm_up(&mut session.renderer, &input).expect("compiled");
         assert!(made > 3, "{}: {made}", driver.name);

@@ -5,13 +5,13 @@ use crate::{
     analytic::{Quadric, SIZE, case, pixels, settings, snell, view, within},
     drivers::SKY,
     host::{self, with_renderer},
-    support::{Choose, Driver, each_driver, random_cloud, sphere},
+    support::{Choose, Driver, each_driver, imai16, random_cloud, sphere},
     walk::degrees,
 };
 use ash::vk;
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{
-    Background, Camera, Ellipsoid, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput, Settings,
+    Background, Camera, Ellipsoid, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput,
     host::{Canvas, Gpu},
     shader::{OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_SCENE, WETTING_GAP},
     twin::{background::env_color, optics::fresnel},
@@ -293,7 +293,7 @@ fn random_scenes_are_met_as_the_twin_meets_them() {
     for background in [Background::Environment, Background::Host] {
         for (seed, refractions) in [(1, 4), (2, 2), (3, 1)] {
             let particles = random_cloud(seed, 0.12, Vec3::new(-0.8, -0.6, -0.5), Vec3::new(0.8, 0.6, 0.5), 12, 40);
-            let settings = Settings::default().refractions(refractions).absorption(tinted);
+            let settings = imai16().refractions(refractions).absorption(tinted);
             let camera = crate::support::camera(Vec3::new(0.3, 0.4, 2.2), Vec3::ZERO, size);
             let case = crate::support::Case { particles, camera, settings, size, eye_inside: false };
             let painted = painted(size, blocks);
@@ -419,7 +419,7 @@ fn environments_may_be_the_hosts_own_images() {
                     let aspect = host::SIZE[0] as f32 / host::SIZE[1] as f32;
                     let mut camera = Camera::look_at(Vec3::ZERO, target, up, 2.0, aspect, 0.1);
                     camera.up = Vec3::Y;
-                    let settings = Settings::default();
+                    let settings = imai16();
                     let output = Canvas::new(gpu, FLOAT4, 16, host::SIZE).expect("canvas");
                     output.write(&filled([0.0; 4]), vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL).expect("written");
                     let input = FrameInput::new(0, &camera, &settings, output.view)

@@ -3,13 +3,12 @@
 use crate::{
     background::{HostScene, painted},
     host::{self, with_renderer},
-    support::{Choose, Random, Shot, each_driver, random_cloud},
+    support::{Choose, Random, Shot, each_driver, imai16, random_cloud},
 };
 use ash::vk;
 use glam::{Mat3, Vec3};
 use meniscus::{
-    Background, Camera, Equirect, FrameInput, Settings, host::Canvas, shader::OUTCOME_NO_LIQUID,
-    twin::background::env_color,
+    Background, Camera, Equirect, FrameInput, host::Canvas, shader::OUTCOME_NO_LIQUID, twin::background::env_color,
 };
 
 const FLOAT4: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
@@ -33,7 +32,7 @@ fn coarse_maps_are_seen_as_the_twin_sees_them() {
                 let aspect = host::SIZE[0] as f32 / host::SIZE[1] as f32;
                 let mut camera = Camera::look_at(Vec3::ZERO, target, up, 2.0, aspect, 0.1);
                 camera.up = Vec3::Y;
-                let settings = Settings::default();
+                let settings = imai16();
                 let input = FrameInput::new(0, &camera, &settings, output.view);
                 gpu.run(|cmd| {
                     output.transition(cmd, vk::ImageLayout::UNDEFINED, WRITTEN);

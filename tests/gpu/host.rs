@@ -1,11 +1,11 @@
 //! The contract with the host: frames in flight, replaced resources, host scenes, output formats.
 
 use crate::drivers::SKY;
-use crate::support::{Case, Choose, Cloud, Driver, camera, each_driver, random_cloud, sphere};
+use crate::support::{Case, Choose, Cloud, Driver, camera, each_driver, imai16, random_cloud, sphere};
 use ash::vk::{self, Handle};
 use glam::Vec3;
 use meniscus::{
-    Error, FrameInput, Particles, Renderer, SceneInput, Settings,
+    Error, FrameInput, Particles, Renderer, SceneInput,
     host::{Canvas, Gpu, HostError, Upload},
     prepare::{DeviceIds, DevicePositions, Search},
     renderer::Amount,
@@ -16,13 +16,7 @@ pub const SIZE: [u32; 2] = [96, 72];
 
 pub fn case(particles: Particles) -> Case {
     let eye = Vec3::new(0.0, 0.0, 3.0);
-    Case {
-        particles,
-        camera: camera(eye, Vec3::ZERO, SIZE),
-        settings: Settings::default(),
-        size: SIZE,
-        eye_inside: false,
-    }
+    Case { particles, camera: camera(eye, Vec3::ZERO, SIZE), settings: imai16(), size: SIZE, eye_inside: false }
 }
 
 pub fn ball() -> Particles {

@@ -7,7 +7,7 @@ use crate::{
     drivers::SKY,
     host::{self, with_renderer},
     splat,
-    support::{Case, Driver, Shot, camera, each_driver, random_cloud, sphere},
+    support::{Case, Driver, Shot, camera, each_driver, imai16, random_cloud, sphere},
 };
 use ash::vk;
 use glam::{DVec2, DVec3, Mat3, Vec3};
@@ -26,7 +26,7 @@ const TINTED: Vec3 = Vec3::new(0.2, 1.5, 3.0);
 
 /// A published method's layers and optics with values of its parameters. The particles' own surfaces, unsmoothed.
 fn settings(optics: &str, values: &[(&str, &str)]) -> Settings {
-    let mut settings = Settings::default();
+    let mut settings = imai16();
     for (family, member) in [("layers", "front"), ("smooth", "none"), ("optics", optics)] {
         settings.method.choose(family, member).expect("a member");
     }

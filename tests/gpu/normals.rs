@@ -1,6 +1,6 @@
 //! Normals of the smoothed body against their twin, which is fed the depths that the GPU itself smoothed.
 
-use crate::support::{Case, Choose, Driver, camera, each_driver, lattice, random_cloud, sphere};
+use crate::support::{Case, Choose, Driver, camera, each_driver, imai16, lattice, random_cloud, sphere};
 use glam::Vec3;
 use meniscus::shader::SIDE_BACK;
 use meniscus::smooth::{normals::twin::normals, plane_fit::twin::view_ray};
@@ -61,7 +61,7 @@ fn check(driver: &Driver, name: &str, case: &Case) -> u32 {
 }
 
 fn settings(iterations: u32) -> Settings {
-    Settings::default().refractions(2).reflections(0).iterations(iterations)
+    imai16().refractions(2).reflections(0).iterations(iterations)
 }
 
 #[test]

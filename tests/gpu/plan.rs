@@ -3,7 +3,7 @@
 use crate::{
     background::{HostScene, painted},
     host::{self, SIZE, case, with_renderer},
-    support::{Choose, each_driver, random_cloud},
+    support::{Choose, each_driver, imai16, random_cloud},
 };
 use ash::vk::{self, Handle};
 use glam::Vec3;
@@ -91,7 +91,7 @@ fn a_warmed_up_renderer_compiles_nothing() {
 #[test]
 fn pools_are_as_large_as_the_plan() {
     let many = |iterations| {
-        let mut method = meniscus::Method::default();
+        let mut method = imai16().method;
         method.smooth = CurvatureFlow::default().iterations(iterations).into();
         Settings::from(method)
     };
@@ -100,7 +100,7 @@ fn pools_are_as_large_as_the_plan() {
             let canvas = Canvas::new(gpu, FORMAT, 16, SIZE).expect("canvas");
             let mut case = case(cloud(5, 60));
             renderer.set_particles(&case.particles).expect("particles");
-            for settings in [many(300), Settings::default(), many(700), many(20)] {
+            for settings in [many(300), imai16(), many(700), many(20)] {
                 case.settings = settings;
                 draw(gpu, renderer, &canvas, &host::input(&case, 0, canvas.view));
                 let times = renderer.times(0).expect("timestamps");
@@ -120,7 +120,7 @@ fn memory_follows_from_the_method() {
     each_driver(|driver| {
         with_renderer(driver, FORMAT, 1, |_, renderer| {
             let names = |smooth: Smooth, refractions| {
-                let mut settings = Settings::default().refractions(refractions);
+                let mut settings = imai16().refractions(refractions);
                 settings.method.smooth = smooth;
                 let amount = Amount::Prepared { splash: 0, body: 60 };
                 let ledger = renderer.memory_requirements(SIZE, amount, &settings).expect("a valid size");

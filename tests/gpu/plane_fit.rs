@@ -1,6 +1,6 @@
 //! Plane fitting against its twin, which is fed the depths and normals that the GPU itself read.
 
-use crate::support::{Case, Choose, Driver, Random, Shot, camera, each_driver, lattice, random_cloud, sphere};
+use crate::support::{Case, Choose, Driver, Random, Shot, camera, each_driver, imai16, lattice, random_cloud, sphere};
 use glam::{Mat3, Vec3};
 use meniscus::smooth::plane_fit::twin::{Outcome, is_close, moved, plane_fit, rounding};
 use meniscus::smooth::plane_fit::{PlaneFit, Weighting};
@@ -27,7 +27,7 @@ struct Seen {
 
 /// Settings for these tests: cheap optics, which come after what is tested, and both sides.
 fn settings(window: u32, iterations: u32, sigma: f32, weighting: Weighting) -> Settings {
-    let mut settings = Settings::default().refractions(2).reflections(0);
+    let mut settings = imai16().refractions(2).reflections(0);
     let fit = PlaneFit::default().window(window).iterations(iterations).sigma(sigma).weighting(weighting);
     settings.method.smooth = fit.into();
     settings

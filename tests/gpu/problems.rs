@@ -2,14 +2,14 @@
 
 use crate::{
     analytic::{Quadric, SIZE, pixels, through, view},
-    support::{Case, Driver, Shot, each_driver, sphere},
+    support::{Case, Driver, Shot, each_driver, imai16, sphere},
     walk::degrees,
 };
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{Ellipsoid, Method, Particles, Settings, shader::SIDE_FRONT, twin::normal::decode_normal};
 
 fn preset(name: &str) -> Settings {
-    let mut settings = Settings::default();
+    let mut settings = imai16();
     settings.method = Method::preset(name).expect("a preset");
     settings
 }

@@ -1,10 +1,10 @@
 //! Neighbours, classes and ellipsoids prepared on the device: the same sets as trying every pair, and what the CPU
 //! prepares.
 
-use crate::support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_driver};
+use crate::support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_driver, imai16};
 use glam::Vec3;
 use meniscus::{
-    Class, Particles, Settings,
+    Class, Particles,
     prepare::{Fit, Input, Options, Search, classify, prepare},
     twin::shape::neighbours,
 };
@@ -15,7 +15,7 @@ pub fn empty(radius: f32) -> Case {
     Case {
         particles: Particles { radius, ellipsoids: Vec::new(), splash_count: 0 },
         camera: camera(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, size),
-        settings: Settings::default().refractions(1),
+        settings: imai16().refractions(1),
         size,
         eye_inside: false,
     }

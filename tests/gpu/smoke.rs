@@ -1,8 +1,7 @@
 //! Two drivers, one frame: it renders, and validation is silent.
 
-use crate::support::{Case, camera, each_driver, random_cloud};
+use crate::support::{Case, camera, each_driver, imai16, random_cloud};
 use glam::Vec3;
-use meniscus::Settings;
 
 #[test]
 fn a_random_cloud_renders() {
@@ -10,7 +9,7 @@ fn a_random_cloud_renders() {
     let case = Case {
         particles: random_cloud(7, 0.05, Vec3::splat(-0.5), Vec3::splat(0.5), 40, 400),
         camera: camera(Vec3::new(0.3, 0.4, 2.0), Vec3::ZERO, size),
-        settings: Settings::default(),
+        settings: imai16(),
         size,
         eye_inside: false,
     };

@@ -1,9 +1,9 @@
 //! Every smoothing filter against its twin, which is fed the depths that the GPU itself read, step by step.
 
-use crate::support::{Case, Choose, Driver, Shot, camera, each_driver, lattice, random_cloud, sphere};
+use crate::support::{Case, Choose, Driver, Shot, camera, each_driver, imai16, lattice, random_cloud, sphere};
 use glam::Vec3;
 use meniscus::{
-    Particles, Settings,
+    Particles,
     smooth::{
         Smooth,
         curvature_flow::CurvatureFlow,
@@ -132,7 +132,7 @@ fn check(driver: &Driver, name: &str, case: &Case, least: usize) -> BTreeSet<&'s
 }
 
 fn case(particles: Particles, eye: Vec3) -> Case {
-    let settings = Settings::default().refractions(2).reflections(0);
+    let settings = imai16().refractions(2).reflections(0);
     Case { particles, camera: camera(eye, Vec3::ZERO, SIZE), settings, size: SIZE, eye_inside: false }
 }
 

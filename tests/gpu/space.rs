@@ -2,11 +2,11 @@
 
 use crate::{
     cull::assert_same,
-    support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_driver, random_cloud},
+    support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_driver, imai16, random_cloud},
 };
 use glam::{Mat3, Mat4, Vec3};
 use meniscus::{
-    Camera, Ellipsoid, Particles, Settings,
+    Camera, Ellipsoid, Particles,
     prepare::{Input, Options, Search, prepare},
 };
 
@@ -34,7 +34,7 @@ fn scaled(scale: f32, shift: Vec3) -> (Case, Vec<Vec3>) {
     let aspect = SIZE[0] as f32 / SIZE[1] as f32;
     let eye = Vec3::new(0.6, 0.8, 3.0) * scale + shift;
     let camera = Camera::look_at(eye, shift, Vec3::Y, 45f32.to_radians(), aspect, 0.01 * scale);
-    let settings = Settings::default().absorption(Vec3::new(0.2, 0.6, 0.9) / scale);
+    let settings = imai16().absorption(Vec3::new(0.2, 0.6, 0.9) / scale);
     (Case { particles, camera, settings, size: SIZE, eye_inside: false }, positions)
 }
 
@@ -134,8 +134,7 @@ fn a_left_handed_world_is_drawn_as_its_mirror_image() {
     let camera = camera(Vec3::new(0.4, 0.5, 2.2), Vec3::ZERO, SIZE);
     let mut mirrored_camera = camera;
     mirrored_camera.view *= Mat4::from_mat3(mirror);
-    let case =
-        |particles, camera| Case { particles, camera, settings: Settings::default(), size: SIZE, eye_inside: false };
+    let case = |particles, camera| Case { particles, camera, settings: imai16(), size: SIZE, eye_inside: false };
     let right = case(right, camera);
     let left = case(left, mirrored_camera);
     left.camera.validate().expect("a reflection is rigid");
@@ -176,7 +175,7 @@ fn crowds_take_no_longer_than_liquid() {
     let case = Case {
         particles,
         camera: camera(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, SIZE),
-        settings: Settings::default().refractions(1),
+        settings: imai16().refractions(1),
         size: SIZE,
         eye_inside: false,
     };

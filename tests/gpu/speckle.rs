@@ -2,7 +2,7 @@
 
 use crate::{
     analytic::{Pixel, Quadric, SIZE, case, pixels, through, view},
-    support::{Choose, Random, each_driver, sphere},
+    support::{Choose, Random, each_driver, imai16, sphere},
     walk::degrees,
 };
 use glam::{DVec3, Vec3};
@@ -52,7 +52,7 @@ fn seen(tilt: f32) -> meniscus::Camera {
 }
 
 fn smooth() -> Settings {
-    Settings::default().iterations(5) // Imai16's, of its steps
+    imai16().iterations(5) // Imai16's, of its steps
 }
 
 #[test]

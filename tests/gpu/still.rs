@@ -3,12 +3,12 @@
 use crate::{
     field,
     shape::empty,
-    support::{Case, Driver, Random, camera, each_driver},
+    support::{Case, Driver, Random, camera, each_driver, imai16},
 };
 use ash::vk;
 use glam::Vec3;
 use meniscus::{
-    FrameInput, Method, Settings,
+    FrameInput, Settings,
     host::Upload,
     layers::field::Field,
     prepare::{DevicePositions, Input, Options, points},
@@ -41,7 +41,7 @@ fn frame(driver: &Driver, input: &FrameInput) -> Seen {
 #[test]
 fn an_orbit_around_particles_that_stay_where_they_are() {
     let positions = cloud();
-    let maps = Settings::from(Method::preset("imai16").expect("a preset"));
+    let maps = imai16();
     let case = empty(RADIUS);
     each_driver(|driver| {
         let upload = Upload::new(driver.gpu(), bytemuck::cast_slice(&positions)).expect("upload");

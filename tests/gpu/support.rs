@@ -3,7 +3,7 @@
 pub use crate::drivers::each_driver;
 use glam::{Mat3, Vec3};
 use meniscus::{
-    Background, Camera, Class, Ellipsoid, FrameInput, Particles, Point, SceneInput, Settings,
+    Background, Camera, Class, Ellipsoid, FrameInput, Method, Particles, Point, SceneInput, Settings,
     host::{Gpu, Instance, Session, Upload},
     inspect::{self, Inspection, Walk},
     layers::Layers,
@@ -229,6 +229,11 @@ impl<'a> Driver<'a> {
         let block = session.block().expect("block");
         Shot { frame, block, space, size: case.size, picture, targets, counters }
     }
+}
+
+/// Of passes that the default does without: Imai16's settings.
+pub fn imai16() -> Settings {
+    Method::preset("imai16").expect("a preset").into()
 }
 
 /// Settings by what tests change of them.

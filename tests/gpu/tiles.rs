@@ -3,11 +3,11 @@
 
 use crate::{
     cull::{around_the_near_plane, both, drawn_as_quads},
-    support::{Case, Choose, Driver, Shot, camera, each_driver, random_cloud, sphere},
+    support::{Case, Choose, Driver, Shot, camera, each_driver, imai16, random_cloud, sphere},
 };
 use glam::Vec3;
 use meniscus::{
-    Camera, Settings,
+    Camera,
     shader::{CLASS_BODY, CLASS_SPLASH, PATTERN_NONE, VIEW_TILE},
     twin::tiles::tiles,
 };
@@ -72,7 +72,7 @@ fn walks_are_where_there_is_liquid() {
                 let cloud = random_cloud(7, 0.04, Vec3::splat(-0.35), Vec3::splat(0.35), splash, body);
                 let camera = camera(Vec3::new(0.35, 0.1, 1.6), Vec3::new(0.25, 0.1, 0.0), size);
                 let mut case = crate::splat::case(cloud, camera, size);
-                case.settings = Settings::default().refractions(refractions);
+                case.settings = imai16().refractions(refractions);
                 let empty = check(driver, &case, &format!("{splash} and {body}"));
                 assert!(empty >= at_least, "{}: {size:?}: {empty}", driver.name);
                 case.settings = case.settings.quads_only(true);
@@ -111,7 +111,7 @@ fn what_is_near_is_everywhere() {
         let cloud = random_cloud(7, 0.05, Vec3::splat(-0.3), Vec3::splat(0.3), 5, 60);
         let inside = crate::splat::case(cloud, camera(Vec3::new(0.0, 0.1, 2.0), Vec3::ZERO, size), size);
         for refractions in [1, 4] {
-            let settings = Settings::default().refractions(refractions);
+            let settings = imai16().refractions(refractions);
             let empty = check(driver, &Case { settings, eye_inside: true, ..inside.clone() }, "inside");
             assert!(empty > 0.3, "{}: {empty}", driver.name);
         }

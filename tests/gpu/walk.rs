@@ -3,7 +3,7 @@
 use crate::{
     background::{HostScene, Painted},
     drivers::SKY,
-    support::{Case, Choose, Driver, Shot, camera, each_driver, random_cloud},
+    support::{Case, Choose, Driver, Shot, camera, each_driver, imai16, random_cloud},
 };
 use glam::{DVec3, Vec3};
 use meniscus::{
@@ -269,8 +269,7 @@ pub fn compare_before(driver: &Driver, case: &Case, painted: &Painted, backgroun
 
 fn optics(refractions: u32, internal_reflections: u32, fresnel: Fresnel, absorption: Vec3) -> Settings {
     {
-        let mut settings =
-            Settings::default().refractions(refractions).reflections(internal_reflections).absorption(absorption);
+        let mut settings = imai16().refractions(refractions).reflections(internal_reflections).absorption(absorption);
         settings.set("fresnel", if fresnel == Fresnel::Exact { "exact" } else { "schlick" }).expect("a parameter");
         settings
     }
@@ -338,7 +337,7 @@ fn random_clouds_are_walked_as_their_twin_walks_them() {
 fn what_absorbs_everything_is_black() {
     let size = [1024, 768];
     let dam_break = crate::splat::dam_break();
-    let mut settings = Settings::default().absorption(Vec3::new(1e30, 3e38, 0.0));
+    let mut settings = imai16().absorption(Vec3::new(1e30, 3e38, 0.0));
     settings.set("sigma", "180").expect("a parameter");
     let aspect = size[0] as f32 / size[1] as f32;
     let mut camera = dam_break.camera;

@@ -1,9 +1,8 @@
 //! What rays meet at each pixel and in each tile equals the twin's, bit for bit.
 
-use crate::support::{Case, Choose, camera, each_driver, random_cloud};
+use crate::support::{Case, Choose, camera, each_driver, imai16, random_cloud};
 use glam::Vec3;
 use meniscus::{
-    Settings,
     shader::WALL_TILE,
     twin::texels::{pixels, tiles},
 };
@@ -23,7 +22,7 @@ fn texels_equal_the_twin() {
         let case = Case {
             particles: random_cloud(11, 0.04, Vec3::splat(-0.6), Vec3::splat(0.6), splash, body),
             camera: camera(eye, Vec3::new(-0.2, -0.1, -2.0), size),
-            settings: Settings::default(),
+            settings: imai16(),
             size,
             eye_inside,
         };
@@ -56,7 +55,7 @@ fn one_refraction_does_without() {
     let mut case = Case {
         particles: random_cloud(11, 0.1, Vec3::splat(-0.6), Vec3::splat(0.6), 10, 30),
         camera: camera(Vec3::new(0.2, 0.1, 2.0), Vec3::ZERO, size),
-        settings: Settings::default(),
+        settings: imai16(),
         size,
         eye_inside: false,
     };

@@ -6,7 +6,7 @@ use clap::{
     builder::{PossibleValue, PossibleValuesParser},
     parser::ValueSource,
 };
-use meniscus::{Error, PRESETS, Parameter, Parameters, Preset, Settings, parameters::Part, prepare};
+use meniscus::{Error, Method, PRESETS, Parameter, Parameters, Preset, Settings, parameters::Part, prepare};
 use serde_json::{Map, Value, json};
 
 /// Where nothing is given, the command line knows better than the library, which does not know the liquid's size.
@@ -145,9 +145,37 @@ pub fn preset(name: &str) -> Option<&'static Preset> {
     PRESETS.iter().find(|p| p.name == name)
 }
 
+/// A method with those of its members that count, and the others of the first method that goes with them.
+pub fn completed(method: &Method, counts: impl Fn(&str) -> bool) -> Method {
+    let named: Vec<_> = method.members().into_iter().filter(|(family, _)| counts(family)).collect();
+    let with = |preset: &Preset| {
+        let other = preset.method();
+        let layers = if counts("layers") { method.layers } else { other.layers };
+        let smooth = if counts("smooth") { method.smooth } else { other.smooth };
+        Some(Method::new(layers, smooth, if counts("optics") { method.optics } else { other.optics }))
+    };
+    first(&named, with).unwrap_or(*method)
+}
+
+/// What is made of the first preset with which it goes together. The default with other optics is still the default; then come
+/// those that have all these members, then those that have these layers and smoothing, then any.
+fn first(named: &[(&str, &str)], made: impl Fn(&Preset) -> Option<Method>) -> Option<Method> {
+    let surfaces = &["layers", "smooth"][..];
+    let ways =
+        [(&PRESETS[..1], surfaces), (PRESETS, &["layers", "smooth", "optics"]), (PRESETS, surfaces), (PRESETS, &[])];
+    ways.into_iter().find_map(|(presets, families)| {
+        let own = |p: &&Preset| {
+            let members = p.method().members();
+            named.iter().all(|one| !families.contains(&one.0) || members.contains(one))
+        };
+        presets.iter().filter(own).filter_map(&made).find(|m| m.validate().is_ok())
+    })
+}
+
 impl clap::Args for Choices {
     fn augment_args(command: Command) -> Command {
-        let help = format!("Published method; what follows changes it [default: {}]", PRESETS[0].name);
+        let first = PRESETS[0].name;
+        let help = format!("Method, which what follows changes [default: {first}, or the first that has what follows]");
         let method = Arg::new(METHOD).long(METHOD).value_name("PRESET").help(help).value_parser(presets());
         let parts = Settings::parts();
         let families = parts.iter().filter(|p| !p.about.is_empty()).map(|p| family(p.name, p.about, &p.members));
@@ -180,6 +208,21 @@ impl FromArgMatches for Choices {
 }
 
 impl Choices {
+    /// Where no method is named: the first that has all the members and parameters that are.
+    fn start(&self) -> Method {
+        let options = prepare::Options::default().parameters();
+        let chosen = |preset: &Preset| {
+            let mut method = preset.method();
+            self.members.iter().all(|(family, member)| method.choose(family, member).is_ok()).then_some(method)
+        };
+        let has = |method: &Method| {
+            let all = Settings::from(*method).parameters();
+            self.values.iter().all(|(name, _)| all.iter().chain(&options).any(|p| p.name == *name))
+        };
+        let named: Vec<_> = self.members.iter().map(|(family, member)| (*family, member.as_str())).collect();
+        first(&named, |preset| chosen(preset).filter(has)).unwrap_or_default()
+    }
+
     /// Whether a parameter was given a value.
     pub fn gives(&self, name: &str) -> bool {
         self.values.iter().any(|v| v.0 == name)
@@ -194,6 +237,8 @@ impl Choices {
     ) -> Result<(), Error> {
         if let Some(preset) = instead.or(self.preset) {
             settings.method = preset.method();
+        } else if settings.method == Method::default() {
+            settings.method = self.start();
         }
         for (family, member) in &self.members {
             settings.method.choose(family, member)?;
@@ -304,10 +349,12 @@ mod tests {
                     let choose = if member.is_empty() { String::new() } else { format!("--{} {member}", part.name) };
                     // Two words of a choice, or the default.
                     let word = p.choices.iter().find(|w| **w != p.default).map_or(p.default.as_str(), |w| w);
-                    let mut settings = Settings::default();
+                    // A method that is not the default: then no other takes its place for what is asked of it.
+                    let imai16 = Settings::from(Method::preset("imai16").expect("a preset"));
+                    let mut settings = imai16;
                     let choices = parsed(&format!("{choose} --{}={word}", kebab(p.name))).expect("a flag");
                     choices.apply(&mut settings, &mut of(), None).expect("set");
-                    let mut expected = Settings::default();
+                    let mut expected = imai16;
                     if !member.is_empty() {
                         expected.method.choose(part.name, member).expect("a member");
                     }
@@ -327,6 +374,35 @@ mod tests {
             choices.apply(&mut settings, &mut options, None).expect("set");
             assert!(options == expected && options != of() && settings == Settings::default(), "{}", p.name);
         }
+    }
+
+    /// Where no method is named it is the first that has what is.
+    #[test]
+    fn what_is_asked_for_decides_where_a_method_starts() {
+        let started = |line: &str, from: Settings| {
+            let mut settings = from;
+            parsed(line)
+                .expect("flags")
+                .apply(&mut settings, &mut Default::default(), None)
+                .map(|()| method_name(&settings))
+        };
+        let from_default = |line: &str| started(line, Settings::default()).expect("settings");
+        assert_eq!(from_default("--ior 1.4 --support 5"), "field");
+        assert_eq!(from_default("--optics two"), "field none two");
+        assert_eq!(from_default("--layers split"), "imai16");
+        assert_eq!(from_default("--layers split --smooth none --optics one"), "split none one");
+        assert!(from_default("--optics two --sigma 3").starts_with("split plane-fit two"));
+        assert_eq!(from_default("--optics ssfr"), "green10");
+        assert_eq!(from_default("--iterations 2"), "imai16");
+        assert!(from_default("--time-step 0.1").starts_with("front curvature-flow"));
+        // What is there stays, and what goes with nothing is refused as the default's.
+        let imai14 = Settings::from(Method::preset("imai14").expect("a preset"));
+        assert!(started("--kernel-radius 5", imai14).expect_err("it has none").to_string().contains("field"));
+        assert!(started("--window 9 --kernel-radius 5", Settings::default()).is_err());
+        let plane_fit = Method::preset("imai16").expect("a preset").smooth;
+        let said = Method::new(Method::default().layers, plane_fit, Method::default().optics);
+        assert_eq!(completed(&said, |family| family == "smooth"), Method::preset("imai16").expect("a preset"));
+        assert_eq!(completed(&Method::default(), |_| false), Method::default());
     }
 
     /// A flag would set only the first of them.

@@ -16,9 +16,16 @@ pub fn explain(
     settings: &Settings,
     size: [u32; 2],
 ) -> Result<Option<String>, HostError> {
-    // What rays meet of a field no map says.
-    if particles.ellipsoids.is_empty() || session.renderer.spec("field head").is_some() {
+    if particles.ellipsoids.is_empty() {
         return Ok(None);
+    }
+    let no_liquid =
+        |why: String| format!("no liquid in the picture, of {} particles: {why}", particles.ellipsoids.len());
+    // What rays meet of a field no map says, but in which tiles of the view there is none.
+    if let Some(tiles) = session.words("field tiles", 0)? {
+        let empty = tiles.chunks_exact(2).all(|bounds| f32::from_bits(bounds[0]).is_infinite());
+        let missed = empty || between_pixels(particles, camera, size);
+        return Ok(missed.then(|| no_liquid(cause(particles, camera, size))));
     }
     let surfaces = session.renderer.surfaces();
     let mut covers = |name: Option<&'static str>| {
@@ -40,7 +47,25 @@ pub fn explain(
             settings.method.smooth.name()
         ),
     };
-    Ok(Some(format!("no liquid in the picture, of {} particles: {why}", particles.ellipsoids.len())))
+    Ok(Some(no_liquid(why)))
+}
+
+/// Whether all of the liquid lies in front of the eye and between the pixels' centres.
+fn between_pixels(particles: &Particles, camera: &Camera, size: [u32; 2]) -> bool {
+    let (low, high) = particles.bounds().unwrap_or_default();
+    let (mut first, mut last) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    for i in 0..8 {
+        let corner = Vec3::select(glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0), high, low);
+        let clip = camera.projection * camera.view.transform_point3(corner).extend(1.0);
+        if clip.w <= 0.0 {
+            return false;
+        }
+        for axis in 0..2 {
+            let pixel = (0.5 * clip[axis] / clip.w + 0.5) * size[axis] as f32 - 0.5;
+            (first[axis], last[axis]) = (first[axis].min(pixel), last[axis].max(pixel));
+        }
+    }
+    (0..2).any(|axis| first[axis].ceil() > last[axis])
 }
 
 /// What the camera and the box around the liquid tell.

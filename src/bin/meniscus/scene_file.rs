@@ -32,7 +32,8 @@ pub enum SceneFileError {
 /// Scene files have some forty lines.
 const LONGEST: u64 = 1 << 20;
 
-/// Reads one. What it does not say is as by default; its paths are relative to itself.
+/// Reads one. What it does not say is as by default, of the method as in the first that has what it says; its paths are relative
+/// to itself.
 pub fn read(path: &Path) -> Result<Picture, SceneFileError> {
     let failed = |source| SceneFileError::Read { path: path.into(), source };
     let mut bytes = Vec::new();
@@ -56,6 +57,9 @@ pub fn read(path: &Path) -> Result<Picture, SceneFileError> {
         SceneFileError::Key { path: path.into(), key: quote(&key), message: message.replace('\n', " ") }
     })?;
     picture.absorption_given = absorption_given;
+    let method = &mut picture.settings.method;
+    let named = |family: &str| table.get("settings")?.get("method")?.get(family).map(|_| true);
+    *method = crate::choices::completed(method, |family| named(family).unwrap_or(false));
     picture.validate().map_err(|source| SceneFileError::Value { path: path.into(), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     for file in [&mut picture.particles, &mut picture.environment.file].into_iter().flatten() {
@@ -128,6 +132,7 @@ mod tests {
     #[test]
     fn what_is_written_is_read() {
         let mut picture = Picture { absorption_given: true, ..Picture::default() };
+        picture.settings.method = meniscus::Method::preset("imai16").expect("a preset");
         picture.settings.set("sigma", "0.1").expect("set");
         picture.settings.method.choose("optics", "two").expect("a member");
         picture.max_memory = "123456789".parse().expect("an amount");

@@ -257,7 +257,7 @@ mod tests {
         let mut found = names(&[preset("imai16")], &["window=5,9,11", "iterations=1,3"], true).expect("ways");
         found.sort();
         // Its own are 9 and 2.
-        let own = Settings::default();
+        let own = preset("imai16").1;
         let value =
             |name: &str| own.parameters().into_iter().find(|p| p.name == name).expect("a parameter").value.to_string();
         assert_eq!([value("window"), value("iterations")], ["9", "2"]);
