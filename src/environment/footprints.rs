@@ -106,6 +106,9 @@ mod tests {
                 }
             }
         }
+        // What would be rounded to 512 steps has 256 of twice the size.
+        let map = Equirect::new(1, 1, &[[511.6, 255.6, 0.0]]).expect("a map");
+        assert_eq!(unpacked(&map)[0][0], [512.0, 256.0, 0.0]);
         // What is more than 2^40 times fainter than the brightest is dark, and a dark map is dark.
         let map = Equirect::new(2, 1, &[[1e30, 0.0, 0.0], [1e10; 3]]).expect("a map");
         assert_eq!(unpacked(&map)[1][0], [0.0; 3]);
