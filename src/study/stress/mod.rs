@@ -55,7 +55,7 @@ pub struct Case {
     pub about: &'static str,
     /// What changes from step to step, with its unit.
     pub x: &'static str,
-    /// Methods that stay within its bounds; of the others nothing is promised, and of [`BOTH`] it is known that they do not.
+    /// Methods that stay within its bounds: of the others nothing is promised, and that `field` or `imai16` is not named means that it does not.
     pub promised: &'static [&'static str],
     /// Its figures, in the order of a step's; the first is common to all cases.
     pub measures: &'static [Measure],
