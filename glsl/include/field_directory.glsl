@@ -1,6 +1,9 @@
 // Looks blocks of the density field up in its directory, of which `directory_texel(i)` gives the i-th four words.
 const uint FIELD_SLOT_TEXELS = uint(FIELD_SLOT) / 4u;
 
+// Where a slot's block lies.
+ivec3 field_place(uint slot) { return ivec3(directory_texel(FIELD_SLOT_TEXELS * slot + FIELD_PLACE / 4u).xyz); }
+
 // The slot of a block, and its first four words; that of one which is not there has nothing in it.
 uint field_slot(ivec3 block, ivec3 base, uint slots, out uvec4 words) {
     uint key = field_key(block, base), slot = field_hash(block) & (slots - 1u), found = slots;
@@ -10,7 +13,7 @@ uint field_slot(ivec3 block, ivec3 base, uint slots, out uvec4 words) {
         bool same = words.x == key;
         // A loop, since drivers on CPUs may run a branch for all invocations that go together where none takes it.
         for (bool far = same && key >= FIELD_FAR; far; far = false)
-            same = ivec3(directory_texel(FIELD_SLOT_TEXELS * slot + FIELD_PLACE / 4u).xyz) == block;
+            same = field_place(slot) == block;
         if (same) found = slot;
         done = same || words.x == 0u;
         slot = (slot + 1u) & (slots - 1u);
@@ -20,3 +23,7 @@ uint field_slot(ivec3 block, ivec3 base, uint slots, out uvec4 words) {
 }
 // Of those four words one bit for each brick that there is.
 uvec2 field_there(uvec4 words) { return words.zw; }
+// And the number of one of them, by its place in the block; 0, which is an empty brick's, where it is not there.
+uint field_number(uvec4 words, uint local) {
+    return field_bit(field_there(words), local) ? words[FIELD_FIRST_BRICK] + field_before(field_there(words), local) : 0u;
+}

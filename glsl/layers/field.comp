@@ -212,16 +212,15 @@ void main() {
             ivec3 step = ivec3(c & 1u, (c >> 1) & 1u, c >> 2), node = r.node + step;
             vec3 weights = mix(1.0 - r.part, r.part, bvec3(step));
             field_slot(field_brick(field_brick(node)), base, build.slots, words);
-            uint local = field_local(field_brick(node));
-            uint number = field_bit(field_there(words), local) ? words[FIELD_FIRST_BRICK] + field_before(field_there(words), local) : 0u;
+            uint number = field_number(words, field_local(field_brick(node)));
             uint pair = nodes.at[FIELD_NODE_WORDS * number + field_local(node) / 2u];
             f += weights.x * weights.y * weights.z * float(int(pair >> (16 * (node.x & 1)) & 0xffffu));
         }
         for (uint k = 0u; f < float(build.level) && k < 8u; ++k) {
             ivec3 brick = r.first + ivec3(k & 1u, (k >> 1) & 1u, k >> 2);
             uint slot = field_slot(field_brick(brick), base, build.slots, words), local = field_local(brick);
-            bool there = all(lessThanEqual(brick, r.last)) && reaches(r, brick) && field_bit(field_there(words), local);
-            if (there) list_ball(r, brick, slot, local, words[FIELD_FIRST_BRICK] + field_before(field_there(words), local));
+            uint number = field_number(words, local);
+            if (all(lessThanEqual(brick, r.last)) && reaches(r, brick) && number > 0u) list_ball(r, brick, slot, local, number);
         }
     }
 }
@@ -317,10 +316,7 @@ void find_brick(ivec3 own, ivec3 step) {
     ivec3 brick = own + step;
     uvec4 words;
     field_slot(field_brick(brick), ivec3(head.base_x, head.base_y, head.base_z), build.slots, words);
-    uint local = field_local(brick);
-    uvec2 there = field_there(words);
-    uint number = field_bit(there, local) ? words[FIELD_FIRST_BRICK] + field_before(there, local) : 0u;
-    numbers[step.x + 1 + 3 * (step.y + 1 + 3 * (step.z + 1))] = number;
+    numbers[step.x + 1 + 3 * (step.y + 1 + 3 * (step.z + 1))] = field_number(words, field_local(brick));
 }
 
 // Reads the sum of a node, by its place around the brick.
@@ -352,10 +348,9 @@ uint bytes(uvec4 words, uint k) {
 void main() {
     uint number = group_index() + 1u, k = gl_LocalInvocationIndex, record = FIELD_RECORD * number;
     if (number > min(head.bricks, build.capacity - 1u)) return;
-    uint home = records.at[record + FIELD_HOME] - 1u, slot = FIELD_SLOT * (home / FIELD_NODES);
+    uint home = records.at[record + FIELD_HOME] - 1u, slot = home / FIELD_NODES;
     if (home == 0xffffffffu) return; // a number that no block has got
-    ivec3 place = ivec3(table.at[slot + FIELD_PLACE], table.at[slot + FIELD_PLACE + 1u], table.at[slot + FIELD_PLACE + 2u]);
-    ivec3 own = (place << FIELD_BRICK_BITS) + field_from_local(home);
+    ivec3 own = (field_place(slot) << FIELD_BRICK_BITS) + field_from_local(home);
     if (k < 8u) find_brick(own, ivec3(k & 1u, (k >> 1) & 1u, k >> 2));
     if (k < 4u) surface[k] = 0u;
     if (k < 2u) found[k] = 0u;
@@ -403,7 +398,7 @@ void main() {
             first_cell = build.cell_capacity;
         } else {
             uint local = home % FIELD_NODES;
-            atomicOr(table.at[slot + FIELD_SURFACE + (local >> 5)], 1u << (local & 31u));
+            atomicOr(table.at[FIELD_SLOT * slot + FIELD_SURFACE + (local >> 5)], 1u << (local & 31u));
             records.at[record + FIELD_FIRST_CELL] = first_cell;
             records.at[record + FIELD_CELLS] = bits.x;
             records.at[record + FIELD_CELLS + 1u] = bits.y;

@@ -14,7 +14,9 @@ layout(push_constant) uniform PushBlock {
     float ball;    // radius of a ball, in spacings
 } push;
 #include "field_space.glsl"
-layout(set = 0, binding = 2, std430) readonly buffer TableBlock { uint at[]; } table;
+layout(set = 0, binding = 2, std430) readonly buffer TableBlock { uvec4 at[]; } table;
+uvec4 directory_texel(uint i) { return table.at[i]; }
+#include "field_directory.glsl"
 layout(set = 0, binding = 3, std430) readonly buffer RecordBlock { uint at[]; } records;
 layout(set = 0, binding = 4, std430) buffer TileBlock { uvec2 at[]; } tiles;
 
@@ -52,8 +54,7 @@ void main() {
     if (number > min(head.bricks, push.capacity - 1u)) return;
     uint record = FIELD_RECORD * number, home = records.at[record + FIELD_HOME] - 1u;
     if (home == 0xffffffffu) return; // a number that no block has got
-    uint slot = FIELD_SLOT * (home / FIELD_NODES);
-    ivec3 ahead = ivec3(table.at[slot + FIELD_PLACE], table.at[slot + FIELD_PLACE + 1u], table.at[slot + FIELD_PLACE + 2u]) - base_block();
+    ivec3 ahead = field_place(home / FIELD_NODES) - base_block();
     vec3 brick = vec3(FIELD_BRICK * (FIELD_BRICK * ahead + field_from_local(home)));
     vec3 low = brick + vec3(field_from_local(cell));
     if (field_bit(uvec2(records.at[record + FIELD_CELLS], records.at[record + FIELD_CELLS + 1u]), cell)) cover(low, low + 1.0);

@@ -91,6 +91,16 @@ impl<'a> Session<'a> {
         Ok(Some(data.chunks_exact(4).map(|w| u32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect()))
     }
 
+    /// The words of several buffers; `None` if the last frame did without one of them.
+    pub fn all_words<const N: usize>(&mut self, names: [&'static str; N]) -> Result<Option<[Vec<u32>; N]>, HostError> {
+        let mut all = [const { Vec::new() }; N];
+        for (words, name) in all.iter_mut().zip(names) {
+            let Some(read) = self.words(name, 0)? else { return Ok(None) };
+            *words = read;
+        }
+        Ok(Some(all))
+    }
+
     /// The block that the last frame's shaders read, completed by them where the device finds the particles' box.
     pub fn block(&mut self) -> Result<Frame, HostError> {
         self.gpu.run(|cmd| {

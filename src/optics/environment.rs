@@ -3,8 +3,7 @@
 use crate::{
     frame::Scene,
     input::EnvironmentShape,
-    plan::{Call, External, Plan, Target},
-    resources::ImageSpec,
+    plan::{Call, External, Plan},
 };
 use ash::vk::Format;
 
@@ -21,14 +20,8 @@ pub(super) fn seen_by(plan: &mut Plan, scene: &Scene, call: Call) -> Call {
     // Of the host's map and our own one is looked at; something has to be bound as the other.
     let own = scene.environment.is_none();
     let (map, footprints) = match own {
-        true => (nothing(plan, "no environment", Format::R32G32B32A32_SFLOAT), plan.given(External::Footprints)),
-        false => (plan.given(External::Environment), nothing(plan, "no footprints", Format::R32G32B32A32_UINT)),
+        true => (plan.nothing("no environment", Format::R32G32B32A32_SFLOAT, false), plan.given(External::Footprints)),
+        false => (plan.given(External::Environment), plan.nothing("no footprints", Format::R32G32B32A32_UINT, false)),
     };
     call.read("environment", map).read("footprints", footprints).constant("OWN_ENVIRONMENT", own)
-}
-
-/// An image that nothing looks at; the same one each time.
-fn nothing(plan: &mut Plan, name: &'static str, format: Format) -> Target {
-    let spec = ImageSpec { format, size: [1, 1], layers: 1, array: false, usage: Default::default() };
-    plan.find(name).unwrap_or_else(|| plan.image(name, spec))
 }

@@ -22,25 +22,25 @@ pub(super) fn draw(plan: &mut Plan, scene: &Scene, field: &Volume) -> (Tiles, (C
         .push("spacing", field.spacing)
         .push("ball", field.build.ball);
     plan.dispatch("field tiles", bounds, Groups::Indirect(field.head, 0));
-    let read = [field.table, field.records, field.cells];
+    let read = [
+        ("table", "table_texels", field.table),
+        ("records", "record_texels", field.records),
+        ("cells", "cell_texels", field.cells),
+    ];
     // As texels too, where the device has so large texel buffers.
-    let texels = read.iter().all(|buffer| plan.bytes(*buffer).is_some_and(|bytes| bytes <= scene.texels_size));
+    let texels = read.iter().all(|(.., buffer)| plan.bytes(*buffer).is_some_and(|bytes| bytes <= scene.texels_size));
     let no_texels = (!texels).then(|| plan.buffer("no texels", 16));
-    let as_texels = |buffer| no_texels.unwrap_or(buffer);
     let (call, vertices) = tiles.draw(plan, scene, &FIELD_WALK_FRAG[variant(scene)], false);
     let call = call
         .read("head", field.head)
-        .read("table", field.table)
-        .read("table_texels", as_texels(field.table))
-        .read("records", field.records)
-        .read("record_texels", as_texels(field.records))
-        .read("cells", field.cells)
-        .read("cell_texels", as_texels(field.cells))
         .read("balls", field.balls)
         .read("tiles", tiles.bounds)
         .constant("TEXELS", texels)
         .push("slots", field.build.slots)
         .push("ball", field.build.ball)
         .push("spacing", field.spacing);
+    let call = read.into_iter().fold(call, |call, (name, as_texels, buffer)| {
+        call.read(name, buffer).read(as_texels, no_texels.unwrap_or(buffer))
+    });
     (tiles, (call, vertices))
 }

@@ -9,8 +9,7 @@ use crate::{
     frame::Scene,
     input::Background,
     layers::{Surface, Surfaces},
-    plan::{Call, External, Plan, Rendering, Target, Vertices},
-    resources::ImageSpec,
+    plan::{Call, External, Plan, Rendering, Vertices},
     shader::WALK_FRAG,
 };
 use ash::vk::Format;
@@ -95,7 +94,7 @@ impl Walk {
         // One refraction looks at fronts alone.
         let walls = match self.refractions > 1 {
             true => walls::record(plan, surfaces, &body, &splash),
-            false => walls::placeholder(plan),
+            false => plan.nothing("no walls", Format::R32G32B32A32_SFLOAT, false),
         };
 
         let (call, vertices) = tiles.draw(plan, scene, &WALK_FRAG[variant(scene)], false);
@@ -119,11 +118,8 @@ pub(super) fn variant(scene: &Scene) -> usize {
 
 /// Maps that nothing looks at.
 pub(super) fn placeholder(plan: &mut Plan) -> Surface {
-    let mut one = |name, format| -> Target {
-        plan.image(name, ImageSpec { format, size: [1, 1], layers: 1, array: true, usage: Default::default() })
-    };
-    let (depth, normal) = (one("no depth", Format::R32_SFLOAT), one("no normal", Format::R32_UINT));
-    Surface { depth, normal, sides: 1 }
+    let depth = plan.nothing("no depth", Format::R32_SFLOAT, true);
+    Surface { depth, normal: plan.nothing("no normal", Format::R32_UINT, true), sides: 1 }
 }
 
 /// Whether a format takes light as it is (float, or sRGB, which the hardware encodes) or encoded by the shader (UNORM);

@@ -25,9 +25,3 @@ pub(super) fn record(plan: &mut Plan, surfaces: &Surfaces, body: &Surface, splas
     plan.dispatch("walls", call, Groups::Direct([tiles[0].div_ceil(WALL_TILE), tiles[1], 1]));
     walls
 }
-
-/// Walls that nothing looks at.
-pub(super) fn placeholder(plan: &mut Plan) -> Target {
-    let format = Format::R32G32B32A32_SFLOAT;
-    plan.image("no walls", ImageSpec { format, size: [1, 1], layers: 1, array: false, usage: Default::default() })
-}

@@ -34,6 +34,12 @@ impl Plan {
         self.declare(name, Made::Own(Spec::Image(spec)), false)
     }
 
+    /// An image of one texel that nothing looks at, for what a shader has a place for and does not use; the same one each time.
+    pub fn nothing(&mut self, name: &'static str, format: vk::Format, array: bool) -> Target {
+        let spec = ImageSpec { format, size: [1, 1], layers: 1, array, usage: Default::default() };
+        self.find(name).unwrap_or_else(|| self.image(name, spec))
+    }
+
     /// A buffer of so many bytes.
     pub fn buffer(&mut self, name: &'static str, bytes: u64) -> Target {
         self.declare(name, Made::Own(Spec::Buffer { bytes, usage: Default::default() }), false)

@@ -5,13 +5,13 @@ use crate::{
     host::{HostError, Session},
     layers::field::{
         Field,
-        twin::{Brick, Corner, Lattice, Place, Words},
+        twin::{Brick, Corner, Lattice, Place, Words, held, local_bit, slope, weights},
     },
-    shader::{FIELD_BRICK, FIELD_HALF, SPLASH_RADIUS},
+    shader::{FIELD_BRICK, SPLASH_RADIUS},
     space::{Space, power_of_two},
     twin::field_walk,
 };
-use glam::{DVec3, I8Vec3, IVec3, Vec3};
+use glam::{DVec3, IVec3, Vec3};
 use std::collections::{BTreeMap, HashMap};
 
 /// What a frame built of a field.
@@ -36,14 +36,8 @@ const FAR: f64 = 1e6;
 impl BuiltField {
     /// Of the last frame; nothing if it built none.
     pub fn read(session: &mut Session, field: &Field, radius: f32) -> Result<Option<BuiltField>, HostError> {
-        let names = ["field directory", "field bricks", "field nodes", "field cells", "field balls"];
-        let mut all = Vec::new();
-        for name in names {
-            let Some(words) = session.words(name, 0)? else { return Ok(None) };
-            all.push(words);
-        }
-        let [directory, records, nodes, cells, balls] = [0, 1, 2, 3, 4].map(|i: usize| all[i].as_slice());
-        Ok(BuiltField::new(Words { directory, records, nodes, cells, balls }.bricks(), field, radius))
+        let Some(all) = session.all_words(Words::BUFFERS)? else { return Ok(None) };
+        Ok(BuiltField::new(Words::new(all.each_ref().map(Vec::as_slice)).bricks(), field, radius))
     }
 
     /// Of what [`Words::bricks`] gives of particles with this radius in world units.
@@ -86,7 +80,7 @@ impl BuiltField {
         let first = edge * place;
         let bit = local_bit(cell - first);
         let in_field = match corners_of(brick, bit) {
-            Some(corners) => between(corners, x - cell.as_dvec3(), value).x >= 0.0,
+            Some(corners) => above(corners, x - cell.as_dvec3()) >= 0.0,
             None => brick.inside >> bit & 1 == 1,
         };
         let center = |ball: &[f32; 3]| first.as_dvec3() + Vec3::from(*ball).as_dvec3();
@@ -164,15 +158,7 @@ fn steps(x: DVec3, dir: DVec3, from: f64, end: f64, edge: f64, mut visit: impl F
 
 /// What is trilinear between a cell's corners.
 fn between(corners: &[Corner; 8], f: DVec3, value: impl Fn(&Corner) -> DVec3) -> DVec3 {
-    let weight = |c: usize| {
-        let [x, y, z] = [0, 1, 2].map(|axis| if c >> axis & 1 == 1 { f[axis] } else { 1.0 - f[axis] });
-        x * y * z
-    };
-    corners.iter().enumerate().map(|(c, corner)| weight(c) * value(corner)).sum()
-}
-
-fn local_bit(local: IVec3) -> u32 {
-    (local.x | local.y << 2 | local.z << 4) as u32
+    corners.iter().zip(weights(f)).map(|(corner, (_, weight))| weight * value(corner)).sum()
 }
 
 /// What the corners of a cell hold, if the surface is in it.
@@ -181,14 +167,14 @@ fn corners_of(brick: &Brick, bit: u32) -> Option<&[Corner; 8]> {
     (brick.cells >> bit & 1 == 1).then(|| brick.corners.get(before as usize)).flatten()
 }
 
-/// The field less its level at a corner.
-fn value(corner: &Corner) -> DVec3 {
-    DVec3::splat(f64::from(corner.0) + 0.5 - f64::from(FIELD_HALF))
+/// The field less its level.
+fn above(corners: &[Corner; 8], f: DVec3) -> f64 {
+    between(corners, f, |corner| DVec3::splat(held(corner))).x
 }
 
 /// Where the field rises through its level along a ray's way through a cell; places are counted from its first node.
 fn rises(corners: &[Corner; 8], x: DVec3, dir: DVec3, from: f64, to: f64) -> Option<f64> {
-    let h = |t: f64| between(corners, x + t * dir, value).x;
+    let h = |t: f64| above(corners, x + t * dir);
     let at = |part: u32| from + (to - from) * f64::from(part) / f64::from(PARTS);
     let part = (0..PARTS).find(|part| h(at(part + 1)) >= 0.0)?;
     let (mut below, mut above) = (at(part), at(part + 1));
@@ -204,5 +190,5 @@ fn rises(corners: &[Corner; 8], x: DVec3, dir: DVec3, from: f64, to: f64) -> Opt
 }
 
 fn normal(corners: &[Corner; 8], f: DVec3) -> DVec3 {
-    -between(corners, f, |corner| I8Vec3::from(corner.1).as_dvec3()).normalize_or(DVec3::NEG_Y)
+    -between(corners, f, slope).normalize_or(DVec3::NEG_Y)
 }

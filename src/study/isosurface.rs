@@ -7,7 +7,7 @@ use crate::{
     Class, Point,
     layers::field::{
         Field,
-        twin::{Lattice, Place},
+        twin::{Lattice, Place, weights},
     },
     space::power_of_two,
 };
@@ -90,13 +90,8 @@ impl Nodes {
 
     /// Trilinear between nodes.
     fn between(&self, x: DVec3) -> f64 {
-        let (corner, f) = (x.floor(), x - x.floor());
-        let each = (0..8).map(|c| {
-            let step = IVec3::new(c & 1, c >> 1 & 1, c >> 2);
-            let weight = DVec3::select(step.cmpeq(IVec3::ONE), f, 1.0 - f);
-            weight.element_product() * self.at(corner.as_ivec3() + step)
-        });
-        each.sum()
+        let corner = x.floor();
+        weights(x - corner).map(|(step, weight)| weight * self.at(corner.as_ivec3() + step)).sum()
     }
 
     /// Against the gradient, over a spacing each way.

@@ -10,15 +10,15 @@ use super::{
 };
 use crate::{
     Equirect, Fresnel,
-    layers::field::twin::{Brick, Corner, Place, corner_of, whole},
+    layers::field::twin::{Brick, Corner, Place, corner_of, held, slope, weights, whole},
     optics::walk::Walk as Rays,
     shader::{
-        BOX_MARGIN, CLASS_BODY, CLASS_SPLASH, FIELD_BRICK, FIELD_HALF, FIELD_NUDGE, OUTCOME_HIT, OUTCOME_NO_LIQUID,
+        BOX_MARGIN, CLASS_BODY, CLASS_SPLASH, FIELD_BRICK, FIELD_NUDGE, OUTCOME_HIT, OUTCOME_NO_LIQUID,
         OUTCOME_NO_WALL, OUTCOME_REFLECTION_LIMIT, OUTCOME_SCENE, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH,
         SPLASH_RADIUS, WETTING_FLAT, WETTING_GAP,
     },
 };
-use glam::{DVec3, I8Vec3, IVec3, Mat3, Vec3, Vec4Swizzles};
+use glam::{DVec3, IVec3, Mat3, Vec3, Vec4Swizzles};
 use std::collections::BTreeMap;
 
 /// The field as the device has built it, and how it lies in the liquid's own space. Lengths below are spacings of its nodes,
@@ -58,23 +58,17 @@ impl<'a> Field<'a> {
     /// Trilinear between nodes of which each has some value.
     fn between(&self, x: DVec3, value: impl Fn(IVec3) -> DVec3) -> DVec3 {
         let corner = x.floor();
-        let f = x - corner;
-        let all = (0..8).map(|c| {
-            let step = IVec3::new(c & 1, c >> 1 & 1, c >> 2);
-            let weight = |axis: usize| if step[axis] == 1 { f[axis] } else { 1.0 - f[axis] };
-            weight(0) * weight(1) * weight(2) * value(corner.as_ivec3() + step)
-        });
-        all.sum()
+        weights(x - corner).map(|(step, weight)| weight * value(corner.as_ivec3() + step)).sum()
     }
 
-    /// The field less its level, in 1/256 of twice the level: in the middle of what a byte stands for.
+    /// The field less its level, in 1/256 of twice the level.
     pub fn at(&self, x: DVec3) -> f64 {
-        self.between(x, |node| DVec3::splat(f64::from(self.node(node).0) + 0.5 - f64::from(FIELD_HALF))).x
+        self.between(x, |node| DVec3::splat(held(&self.node(node)))).x
     }
 
     /// Its gradient, in no unit: trilinear between what nodes hold.
     pub fn gradient(&self, x: DVec3) -> DVec3 {
-        self.between(x, |node| I8Vec3::from(self.node(node).1).as_dvec3())
+        self.between(x, |node| slope(&self.node(node)))
     }
 
     fn ball_radius(&self) -> f64 {

@@ -54,14 +54,7 @@ fn made(shot: &Shot) -> Vec<Vec4> {
 }
 
 pub fn words(shot: &Shot) -> Words<'_> {
-    let of = |name| shot.words(name, 0).expect("a field");
-    Words {
-        directory: of("field directory"),
-        records: of("field bricks"),
-        nodes: of("field nodes"),
-        cells: of("field cells"),
-        balls: of("field balls"),
-    }
+    Words::new(Words::BUFFERS.map(|name| shot.words(name, 0).expect("a field")))
 }
 
 /// Nodes, cells, their corners and balls of a brick.

@@ -20,12 +20,9 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 pub fn write(job: &Job, session: &mut Session, mut write: impl FnMut(&str, Vec<u8>) -> Result<()>) -> Result<()> {
     let radius = job.scene.particles.radius;
     let Layers::Field(field) = job.settings.method.layers else { return Ok(()) };
-    let Some(directory) = session.words("field directory", 0)? else { return Ok(()) };
-    let mut words = |name| session.words(name, 0).map(Option::unwrap_or_default);
-    let (records, nodes) = (words("field bricks")?, words("field nodes")?);
-    let (cells, balls) = (words("field cells")?, words("field balls")?);
-    let all = Words { directory: &directory, records: &records, nodes: &nodes, cells: &cells, balls: &balls };
-    let bricks = all.bricks();
+    let Some(buffers) = session.all_words(Words::BUFFERS)? else { return Ok(()) };
+    let all = Words::new(buffers.each_ref().map(Vec::as_slice));
+    let (directory, bricks) = (all.directory, all.bricks());
     let n = bricks.len() as u64;
     let slots = directory.len() as u64 / u64::from(FIELD_SLOT);
     write("field_directory.npy", npy(&[slots, u64::from(FIELD_SLOT)], directory.iter().copied())?)?;

@@ -11,7 +11,7 @@ use crate::{
     },
     space::power_of_two,
 };
-use glam::{DVec3, IVec3, Vec4};
+use glam::{DVec3, I8Vec3, IVec3, Vec4};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Coordinates of a node or a brick.
@@ -153,7 +153,16 @@ pub struct Words<'a> {
     pub balls: &'a [u32],
 }
 
-impl Words<'_> {
+impl<'a> Words<'a> {
+    /// Names of these buffers, in their order.
+    pub const BUFFERS: [&'static str; 5] =
+        ["field directory", "field bricks", "field nodes", "field cells", "field balls"];
+
+    /// Of the buffers in the order of [`Words::BUFFERS`].
+    pub fn new([directory, records, nodes, cells, balls]: [&'a [u32]; 5]) -> Words<'a> {
+        Words { directory, records, nodes, cells, balls }
+    }
+
     fn slot(&self, slot: usize) -> &[u32] {
         &self.directory[FIELD_SLOT as usize * slot..][..FIELD_SLOT as usize]
     }
@@ -234,9 +243,30 @@ impl Words<'_> {
         let hash = mixed ^ mixed >> 13;
         let slots = (0..FIELD_PROBES).map(|i| hash.wrapping_add(i) as usize % self.slots());
         let mut own = slots.take_while(|s| self.slot(*s)[0] != 0).filter(|s| self.place(*s) == block);
-        let local = IVec3::from(brick) & 3;
-        own.next().and_then(|slot| self.number(slot, (local.x | local.y << 2 | local.z << 4) as u32)).unwrap_or(0)
+        let local = local_bit(IVec3::from(brick) & 3);
+        own.next().and_then(|slot| self.number(slot, local)).unwrap_or(0)
     }
+}
+
+/// Which bit of a brick's a cell or node has, by its place in it; or of a block's a brick.
+pub fn local_bit(local: IVec3) -> u32 {
+    (local.x | local.y << 2 | local.z << 4) as u32
+}
+
+/// The corners of a cell, x before y before z: from its first node on, and what each weighs at a place in the cell.
+pub fn weights(f: DVec3) -> impl Iterator<Item = (IVec3, f64)> {
+    let steps = (0..8).map(|c| IVec3::new(c & 1, c >> 1 & 1, c >> 2));
+    steps.map(move |step| (step, DVec3::select(step.cmpeq(IVec3::ONE), f, 1.0 - f).element_product()))
+}
+
+/// The field less its level, in 1/256 of twice the level: in the middle of what a corner's byte stands for.
+pub fn held(corner: &Corner) -> f64 {
+    f64::from(corner.0) + 0.5 - f64::from(FIELD_HALF)
+}
+
+/// Its gradient there, in no unit.
+pub fn slope(corner: &Corner) -> DVec3 {
+    I8Vec3::from(corner.1).as_dvec3()
 }
 
 /// Two words as one, the lower bits first.
@@ -251,13 +281,8 @@ pub fn enclosed(bricks: &BTreeMap<Place, Brick>, level: f64, x: DVec3, density: 
         return f64::INFINITY;
     }
     let first = x.floor();
-    let f = x - first;
-    let corners = places(IVec3::ZERO, IVec3::ONE).map(|step| {
-        let [a, b, c] = [0, 1, 2].map(|axis| if step[axis] == 1 { f[axis] } else { 1.0 - f[axis] });
-        let node = (first.as_ivec3() + IVec3::from(step)).to_array();
-        a * b * c * f64::from(node_of(bricks, node)) / f64::from(FIELD_ONE)
-    });
-    corners.sum::<f64>() / level
+    let node = |step: IVec3| f64::from(node_of(bricks, (first.as_ivec3() + step).to_array())) / f64::from(FIELD_ONE);
+    weights(x - first).map(|(step, weight)| weight * node(step)).sum::<f64>() / level
 }
 
 /// The field at a node times [`FIELD_ONE`], from bricks; 0 where there is none.

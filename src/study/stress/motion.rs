@@ -17,6 +17,7 @@ use crate::{
     },
 };
 use glam::{DVec2, DVec3, Vec3};
+use std::collections::hash_map::Entry;
 
 const MEASURES: &[Measure] = &[
     NO_NUMBER,
@@ -96,11 +97,10 @@ fn sweep(
         let view = view(x);
         let shot = rig.shoot(&cloud, 1.0, &view, settings)?;
         let key = format!("{name} {x}");
-        let truth = match rig.truths.get(&key) {
-            Some(known) => known.clone(),
-            None => Moment::of_truth(&cloud, &view)?,
+        let truth = match rig.truths.entry(key) {
+            Entry::Occupied(known) => known.get().clone(),
+            Entry::Vacant(place) => place.insert(Moment::of_truth(&cloud, &view)?).clone(),
         };
-        rig.truths.insert(key, truth.clone());
         let now = [Moment::of(&shot), truth];
         let change = |k: usize| {
             before
