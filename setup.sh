@@ -48,7 +48,8 @@ if [ -f "$layer" ] && [ -f "$manifest" ]; then
   mkdir -p target/layers
   sed "s#\"library_path\": *\"[^\"]*\"#\"library_path\": \"$layer\"#" "$manifest" > target/layers/VkLayer_khronos_validation.json
 fi
-# A third Vulkan driver: Mesa 25's lavapipe, from Debian 12's backports. It is not installed, only unpacked, and it finds what
+# A third Vulkan driver: Mesa 25's lavapipe, from Debian 12's backports, and RADV of the same package, whose null hardware
+# compiles for GPUs that are not there. It is not installed, only unpacked, and it finds what
 # it links with among Debian's own libraries; setup goes on without it wherever it cannot be had.
 mesa=target/mesa25
 unpack_mesa() {
@@ -65,16 +66,20 @@ unpack_mesa() {
   "${apt[@]}" update || return 1
   local package=mesa-vulkan-drivers/bookworm-backports
   (cd debs && "${apt[@]}" download "$package") && dpkg-deb -x debs/mesa-vulkan-drivers_*.deb root || return 1
-  local library=$here/libvulkan_lvp.so
-  find root -name libvulkan_lvp.so -exec mv -t . {} + && [ -f "$library" ] || { echo "the package has no lavapipe"; return 1; }
-  # The loader would complain in every run of a driver that links with newer libraries than are here.
-  ! ldd -r "$library" 2>&1 | grep -E 'not found|undefined symbol' || return 1
-  # Last: where the manifest is there, all is.
-  sed "s#\"library_path\": *\"[^\"]*\"#\"library_path\": \"$library\"#" root/usr/share/vulkan/icd.d/lvp_icd*.json > manifest.new
-  rm -rf lists cache debs root sources.list && grep -qF "\"$library\"" manifest.new && mv manifest.new lvp_icd.json
+  local driver library
+  # Lavapipe last: where its manifest is there, all is.
+  for driver in radeon lvp; do
+    library=$here/libvulkan_$driver.so
+    find root -name "libvulkan_$driver.so" -exec mv -t . {} + && [ -f "$library" ] || { echo "the package has no $driver"; return 1; }
+    # The loader would complain in every run of a driver that links with newer libraries than are here.
+    ! ldd -r "$library" 2>&1 | grep -E 'not found|undefined symbol' || return 1
+    sed "s#\"library_path\": *\"[^\"]*\"#\"library_path\": \"$library\"#" root/usr/share/vulkan/icd.d/${driver}_icd*.json > manifest.new
+    grep -qF "\"$library\"" manifest.new && mv manifest.new "${driver}_icd.json" || return 1
+  done
+  rm -rf lists cache debs root sources.list
 }
 # The manifest has an absolute path: a checkout that was moved unpacks anew. What failed once is not tried again.
-if ! grep -qsF "\"$PWD/$mesa/" "$mesa/lvp_icd.json" && [ ! -e target/no-mesa25 ]; then
+if ! { grep -qsF "\"$PWD/$mesa/" "$mesa/lvp_icd.json" && [ -f "$mesa/radeon_icd.json" ]; } && [ ! -e target/no-mesa25 ]; then
   if ! why=$(unpack_mesa 2>&1); then
     rm -rf "$mesa" && touch target/no-mesa25
     echo "setup: no third driver, Mesa 25 of Debian's backports (${why##*$'\n'}); remove target/no-mesa25 to try again" >&2

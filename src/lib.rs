@@ -48,6 +48,8 @@
 
 mod access;
 pub mod auto;
+#[cfg(feature = "inspect")]
+pub mod compiler;
 pub mod device;
 pub mod environment;
 pub mod error;

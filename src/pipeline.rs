@@ -38,6 +38,9 @@ pub(crate) struct Pipeline {
     sampler: vk::Sampler,
 }
 
+/// Nothing is asked of a pipeline but to work.
+const PLAIN: vk::PipelineCreateFlags = vk::PipelineCreateFlags::empty();
+
 /// Every pipeline that was ever asked for.
 #[derive(Default)]
 pub(crate) struct Pipelines(HashMap<Recipe, Pipeline>);
@@ -48,8 +51,8 @@ impl Pipelines {
         let missing: Vec<_> = recipes.into_iter().filter(|r| !self.0.contains_key(*r)).collect();
         // One after the other where there is one: a frame on the host's thread wakes no others.
         let made: Vec<_> = match missing.as_slice() {
-            [one] => vec![Pipeline::new(host, one)],
-            many => many.par_iter().map(|r| Pipeline::new(host, r)).collect(),
+            [one] => vec![Pipeline::new(host, one, PLAIN)],
+            many => many.par_iter().map(|r| Pipeline::new(host, r, PLAIN)).collect(),
         };
         let mut first_error = Ok(missing.len());
         for (recipe, pipeline) in missing.into_iter().zip(made) {
@@ -104,7 +107,7 @@ impl Drop for Module<'_> {
 }
 
 impl Pipeline {
-    fn new(host: &Host, recipe: &Recipe) -> Result<Pipeline, Error> {
+    pub fn new(host: &Host, recipe: &Recipe, flags: vk::PipelineCreateFlags) -> Result<Pipeline, Error> {
         // Not every device blends every float format: layers that need it are refused on those.
         for (format, blend) in &recipe.colors {
             host.check_attachment(*format, *blend != Blend::Replace)?;
@@ -113,8 +116,8 @@ impl Pipeline {
         let modules = modules?;
         let mut pipeline = Self::layouts(host, recipe)?;
         let made = match modules.as_slice() {
-            [one] => pipeline.compute(host, recipe, one),
-            _ => pipeline.graphics(host, recipe, &modules),
+            [one] => pipeline.compute(host, recipe, one, flags),
+            _ => pipeline.graphics(host, recipe, &modules, flags),
         };
         pipeline.finish(host, recipe.name(), made)?;
         Ok(pipeline)
@@ -172,7 +175,7 @@ impl Pipeline {
         Ok(())
     }
 
-    fn compute(&self, host: &Host, recipe: &Recipe, module: &Module) -> Made {
+    fn compute(&self, host: &Host, recipe: &Recipe, module: &Module, flags: vk::PipelineCreateFlags) -> Made {
         let (entries, data) = map_entries(&recipe.constants);
         let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&data));
         let stage = vk::PipelineShaderStageCreateInfo::default()
@@ -180,12 +183,12 @@ impl Pipeline {
             .module(module.0)
             .name(c"main")
             .specialization_info(&special);
-        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
+        let info = vk::ComputePipelineCreateInfo::default().flags(flags).stage(stage).layout(self.layout);
         // SAFETY: module, layout and specialisation outlive the call; the cache is alive or null (contract of `Host`).
         unsafe { host.device.create_compute_pipelines(host.pipeline_cache, &[info], None) }
     }
 
-    fn graphics(&self, host: &Host, recipe: &Recipe, modules: &[Module]) -> Made {
+    fn graphics(&self, host: &Host, recipe: &Recipe, modules: &[Module], flags: vk::PipelineCreateFlags) -> Made {
         let (entries, data) = map_entries(&recipe.constants);
         let special = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&data));
         let stages = [vk::ShaderStageFlags::VERTEX, vk::ShaderStageFlags::FRAGMENT];
@@ -219,6 +222,7 @@ impl Pipeline {
             .color_attachment_formats(&formats)
             .depth_attachment_format(depth_format);
         let info = vk::GraphicsPipelineCreateInfo::default()
+            .flags(flags)
             .stages(&stage_infos)
             .vertex_input_state(&input)
             .input_assembly_state(&assembly)

@@ -6,11 +6,11 @@ mod uploads;
 use crate::{
     Error, access,
     device::{self, Host, Limits},
-    frame::{self, Kept, Preparation, Scene},
+    frame::{self, Kept, Scene},
     input::FrameInput,
     pipeline::Pipelines,
     plan::{Home, Made, Plan},
-    prepare::{self, DevicePositions},
+    prepare::DevicePositions,
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder},
     resources::{Buffer, Resource, Retired, Spec},
@@ -174,31 +174,11 @@ impl Renderer {
         (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
         scene.space = input.positions.map_or(self.scene.space, |p| Space::new(p.radius, Vec3::ZERO));
         if let Some(p) = &input.positions {
-            self.fill(&mut scene, Amount::OnDevice(p))?;
+            Amount::OnDevice(p).fill(&mut scene)?;
         }
         #[cfg(feature = "inspect")]
         self.inspection.apply(&mut scene);
         Ok(scene)
-    }
-
-    /// Puts particles into a scene.
-    fn fill(&self, scene: &mut Scene, amount: Amount) -> Result<(), Error> {
-        match amount {
-            Amount::Prepared { splash, body } => {
-                (scene.count, scene.splash, scene.body) = ((splash + body) as u32, splash > 0, body > 0);
-            }
-            Amount::OnDevice(p) => {
-                scene.count = p.count;
-                // Only the device will know whether there are particles of each class.
-                (scene.splash, scene.body) = (p.count > 0, p.count > 0);
-                let constants = p.constants(BINDING_ALIGNMENT)?;
-                let yu_turk = p.options.ellipsoids == prepare::Fit::YuTurk;
-                let (entries, kept) = (p.entries(), p.kept());
-                let made = Preparation { constants, entries, yu_turk, kept, anew: true, neighbours: 0 };
-                scene.prepare = (p.count > 0).then_some(made);
-            }
-        }
-        Ok(())
     }
 
     /// Refuses particles whose buffers the device cannot bind.

@@ -1,13 +1,13 @@
 //! What can be asked for and made before a frame is recorded: its memory and its pipelines.
 
 use super::{
-    HOMES, Renderer,
+    BINDING_ALIGNMENT, HOMES, Renderer,
     uploads::{PARTICLE_ARRAYS, POINTS, SPEEDS},
 };
 use crate::{
     Error, Settings,
     device::{Host, Limits},
-    frame::{self, Scene},
+    frame::{self, Preparation, Scene},
     input::{Background, EnvironmentShape, FrameInput},
     plan::Plan,
     prepare::{self, DeviceIds, DevicePositions, Search},
@@ -31,6 +31,28 @@ pub enum Amount<'a> {
     OnDevice(&'a DevicePositions),
 }
 
+impl Amount<'_> {
+    /// Puts them into a scene.
+    pub(crate) fn fill(self, scene: &mut Scene) -> Result<(), Error> {
+        match self {
+            Amount::Prepared { splash, body } => {
+                (scene.count, scene.splash, scene.body) = ((splash + body) as u32, splash > 0, body > 0);
+            }
+            Amount::OnDevice(p) => {
+                scene.count = p.count;
+                // Only the device will know whether there are particles of each class.
+                (scene.splash, scene.body) = (p.count > 0, p.count > 0);
+                let constants = p.constants(BINDING_ALIGNMENT)?;
+                let yu_turk = p.options.ellipsoids == prepare::Fit::YuTurk;
+                let (entries, kept) = (p.entries(), p.kept());
+                let made = Preparation { constants, entries, yu_turk, kept, anew: true, neighbours: 0 };
+                scene.prepare = (p.count > 0).then_some(made);
+            }
+        }
+        Ok(())
+    }
+}
+
 impl Renderer {
     /// Device memory that frames of a size take, resource by resource, before anything is allocated. Particles that the
     /// host prepared are extra, 36 bytes each, 4 more with their speeds and 16 with their points, and a static environment map, 16 bytes a texel.
@@ -43,7 +65,7 @@ impl Renderer {
         self.check_size(size)?;
         settings.validate()?;
         let mut scene = Scene::new(settings, size, [0, 0], &self.limits);
-        self.fill(&mut scene, amount)?;
+        amount.fill(&mut scene)?;
         Ok(table::ledger(&self.host.device, &frame::plan(&scene)?))
     }
 
@@ -91,7 +113,7 @@ impl Renderer {
                 let kept = plain.keep_class_below(1.0);
                 for positions in [plain, kept, kept.ids(DeviceIds::packed(vk::Buffer::null(), 1))] {
                     let mut scene = scene([0, 0]);
-                    self.fill(&mut scene, Amount::OnDevice(&positions))?;
+                    Amount::OnDevice(&positions).fill(&mut scene)?;
                     scenes.push(scene);
                 }
             }

@@ -3,6 +3,7 @@
 mod bench;
 mod drivers;
 mod outputs;
+mod pipelines;
 mod refusals;
 mod render;
 mod scenes;

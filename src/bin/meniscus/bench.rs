@@ -50,21 +50,6 @@ pub struct Args {
 }
 
 impl Args {
-    /// What is asked for, once for each method, and what the method is called.
-    fn pictures(&self) -> Result<Vec<(String, Picture)>, Box<dyn std::error::Error>> {
-        let mut base = self.options.base()?;
-        base.prepare.get_or_insert(Prepare::Gpu);
-        if self.methods.is_empty() {
-            let picture = self.options.over(base, None)?;
-            return Ok(vec![(choices::method_name(&picture.settings), picture)]);
-        }
-        let each = self.methods.iter().map(|name| {
-            let picture = self.options.over(base.clone(), choices::preset(name));
-            Ok((name.clone(), picture.map_err(|e| format!("--methods {name}: {e}"))?))
-        });
-        each.collect()
-    }
-
     /// Shows a line of figures. Where a file gets them too, the terminal's may be lost.
     pub fn show(&self, line: &str) -> Result<(), NotWritten> {
         terminal::line(line).or_else(|e| if self.output.is_some() { Ok(()) } else { Err(e) })
@@ -123,7 +108,7 @@ const SIZES: [u32; 6] = [1_000, 10_000, 100_000, 1_000_000, 4_000_000, 10_000_00
 pub const SEED: u64 = 1;
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
-    let pictures = args.pictures()?;
+    let pictures = args.options.each(Prepare::Gpu, &args.methods)?;
     let picture = &pictures[0].1;
     args.check(picture)?;
     if args.scaling && args.files.is_empty() && !args.scenes && args.max_particles < SIZES[0] {

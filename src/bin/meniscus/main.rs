@@ -17,6 +17,7 @@ mod info;
 mod options;
 mod outputs;
 mod picture;
+mod pipelines;
 mod prepared;
 mod render;
 mod report;
@@ -69,6 +70,8 @@ enum Command {
     /// Find the cheapest settings within an error, or the best within a time, and write them as a scene file
     #[cfg(feature = "study")]
     Tune(Box<tune::Args>),
+    /// Print what a driver's compiler makes of a method's shaders: registers, spills, occupancy; needs no GPU
+    Pipelines(Box<pipelines::Args>),
     /// List devices, drivers, features, limits and file formats.
     Info,
 }
@@ -106,6 +109,7 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         Command::Stress(args) => stress::run(&args),
         #[cfg(feature = "study")]
         Command::Tune(args) => tune::run(&args),
+        Command::Pipelines(args) => pipelines::run(&args),
         Command::Info => info::run(),
     }
 }

@@ -7,8 +7,8 @@ use crate::{
     scene_file, terminal,
 };
 use glam::DVec3;
-use meniscus::{Error, Parameters, Preset, io::Budget};
-use std::{fmt::Display, path::PathBuf};
+use meniscus::{Parameters, Preset, io::Budget};
+use std::{error::Error, fmt::Display, path::PathBuf};
 
 /// Options that take the place of what a picture has there: each with its flag, its type and its place.
 macro_rules! replacing {
@@ -116,8 +116,24 @@ impl Options {
         self.scene.as_deref().map_or_else(|| Ok(Picture::default()), scene_file::read)
     }
 
+    /// The picture once for each method, or once as it is, and what its method is called; prepared where these options or the
+    /// scene file say, or else here.
+    pub fn each(&self, prepare: Prepare, methods: &[String]) -> Result<Vec<(String, Picture)>, Box<dyn Error>> {
+        let mut base = self.base()?;
+        base.prepare.get_or_insert(prepare);
+        if methods.is_empty() {
+            let picture = self.over(base, None)?;
+            return Ok(vec![(choices::method_name(&picture.settings), picture)]);
+        }
+        let each = methods.iter().map(|name| {
+            let picture = self.over(base.clone(), choices::preset(name));
+            Ok((name.clone(), picture.map_err(|e| format!("--methods {name}: {e}"))?))
+        });
+        each.collect()
+    }
+
     /// A picture with what these options say of it; a method may take the place of theirs.
-    pub fn over(&self, mut picture: Picture, method: Option<&Preset>) -> Result<Picture, Error> {
+    pub fn over(&self, mut picture: Picture, method: Option<&Preset>) -> Result<Picture, meniscus::Error> {
         self.replacing.apply(&mut picture);
         picture.drop_invalid |= self.drop_invalid;
         picture.absorption_given |= self.choices.gives(choices::LEFT_OPEN);

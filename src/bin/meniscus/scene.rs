@@ -60,7 +60,7 @@ impl Prepare {
         self.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned())
     }
 
-    fn search(self, otherwise: Search) -> Search {
+    pub fn search(self, otherwise: Search) -> Search {
         if self == Prepare::GpuRelation { Search::Relation } else { otherwise }
     }
 }
