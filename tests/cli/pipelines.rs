@@ -78,10 +78,9 @@ fn what_is_compiled_follows_the_settings() {
         stages(&figures).into_iter().map(|(name, ..)| name).collect()
     };
     let [plain, nothing] = [&["--method", "imai16"][..], &["--method", "imai16", "--count", "0"]].map(shaders);
-    assert!(
-        plain.contains("smooth/plane_fit.comp, compute") && plain.contains("optics/walk.frag, fragment"),
-        "{plain:?}"
-    );
+    for stage in ["smooth/plane_fit.comp, compute", "optics/tiles.vert, vertex", "optics/walk.frag, fragment"] {
+        assert!(plain.contains(stage), "no {stage} in {plain:?}");
+    }
     assert!(nothing.iter().all(|name| name.starts_with("optics/")) && !nothing.is_empty(), "{nothing:?}");
     let constants = |most: &str| {
         let figures = compiled(&manifest, &["--method", "imai16", "--internal-reflections", most]);
