@@ -280,7 +280,7 @@ mod tests {
             if flying.len() > 6 {
                 let (of, span_ms) = flying.pop_front().expect("frames");
                 let before = auto.pick();
-                let why = auto.observe(of, &FrameTimes { passes: Vec::new(), span_ms }, &[]).cloned();
+                let why = auto.observe(of, &FrameTimes { passes: Vec::new(), span_ms, begin_ns: 0.0 }, &[]).cloned();
                 assert_eq!(why.is_some(), auto.pick() != before);
                 assert!(why.is_none_or(|why| why == *auto.why()));
                 if auto.pick() != before {
@@ -327,7 +327,7 @@ mod tests {
     #[test]
     fn what_leaves_liquid_out_is_not_drawn_again() {
         let mut auto = auto(8.0);
-        let fast = FrameTimes { passes: Vec::new(), span_ms: 0.1 };
+        let fast = FrameTimes { passes: Vec::new(), span_ms: 0.1, begin_ns: 0.0 };
         let why = auto.observe(auto.pick(), &fast, &[("field_bricks_left_out", 0), ("field_cells_left_out", 7)]);
         let said = why.map(ToString::to_string);
         assert_eq!(said.as_deref(), Some("imai16 left out liquid (field_cells_left_out: 7)"));

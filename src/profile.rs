@@ -13,6 +13,8 @@ use ash::vk;
 pub struct PassTime {
     /// The pass's name, also its debug label.
     pub name: String,
+    /// When it began, in milliseconds after the frame's first timestamp.
+    pub begin_ms: f64,
     /// Milliseconds from the pass's first to its last command.
     pub ms: f64,
     /// Whether it works for the particles, whatever the view: prepares them.
@@ -30,6 +32,8 @@ pub struct FrameTimes {
     pub passes: Vec<PassTime>,
     /// First to last timestamp of the frame.
     pub span_ms: f64,
+    /// The first timestamp in nanoseconds of the device's clock, which may begin anew: it has the bits that the queue family says.
+    pub begin_ns: f64,
 }
 
 pub(crate) struct Profiler {
@@ -111,12 +115,14 @@ impl Profiler {
             .zip(ticks.chunks(2))
             .map(|((name, home, part), t)| PassTime {
                 name: (*name).to_owned(),
+                begin_ms: ms(ticks[0], t[0]),
                 ms: ms(t[0], t[1]),
                 prepares: *home == Home::Particles,
                 part,
             })
             .collect();
-        Some(FrameTimes { passes, span_ms: ms(ticks[0], ticks[ticks.len() - 1]) })
+        let begin_ns = (ticks[0] & self.mask) as f64 * self.period_ns;
+        Some(FrameTimes { passes, span_ms: ms(ticks[0], ticks[ticks.len() - 1]), begin_ns })
     }
 
     pub fn destroy(&mut self, device: &ash::Device) {

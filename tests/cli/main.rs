@@ -4,6 +4,7 @@ mod bench;
 mod drivers;
 mod outputs;
 mod pipelines;
+mod profiling;
 mod refusals;
 mod render;
 mod scenes;

@@ -1,5 +1,8 @@
 //! `meniscus bench`: what each pass takes, in figures that can be repeated.
 
+mod compare;
+mod trace;
+
 use crate::{
     choices, empty, on,
     options::Options,
@@ -47,6 +50,12 @@ pub struct Args {
     /// Where to write the figures: .json or .csv; the terminal shows them in any case
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// Where to write a trace of the frames that are measured, for ui.perfetto.dev or Chrome's about:tracing
+    #[arg(long, value_name = "FILE.json")]
+    pub trace: Option<PathBuf>,
+    /// Measures nothing: says what changed from one file of figures to another, beyond the noise of both
+    #[arg(long, num_args = 2, value_names = ["BEFORE.json", "NOW.json"], exclusive = true)]
+    pub compare: Vec<PathBuf>,
 }
 
 impl Args {
@@ -57,13 +66,19 @@ impl Args {
 
     /// Refuses what cannot be written, before anything is measured.
     fn check(&self, picture: &Picture) -> Result<(), Box<dyn std::error::Error>> {
-        let Some(path) = &self.output else { return Ok(()) };
-        report::check_extension(path)?;
+        if let Some(path) = &self.output {
+            report::check_extension(path)?;
+        }
+        if let Some(path) = self.trace.as_ref().filter(|p| p.extension().is_none_or(|e| e != "json")) {
+            return Err(format!("{}: name a trace that ends in .json", path.display()).into());
+        }
         let files = self.files.iter().chain(&picture.particles);
         let mut inputs: Vec<_> = files.map(|p| ("a particle file", p.as_path())).collect();
         inputs.extend(self.options.scene.as_deref().map(|p| ("the scene file (--scene)", p)));
         inputs.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
-        Ok(outputs::check(&[("the figures (--output)", path)], None, &inputs)?)
+        let written = [("the figures (--output)", &self.output), ("the trace (--trace)", &self.trace)];
+        let written: Vec<_> = written.iter().filter_map(|(what, path)| Some((*what, path.as_deref()?))).collect();
+        Ok(outputs::check(&written, None, &inputs)?)
     }
 }
 
@@ -83,6 +98,8 @@ pub struct Run {
     pub span: Vec<f64>,
     pub sum: Vec<f64>,
     pub preparation: Vec<f64>,
+    /// And as they were measured.
+    pub frames: Vec<FrameTimes>,
     pub memory: Vec<LedgerEntry>,
 }
 
@@ -108,6 +125,10 @@ const SIZES: [u32; 6] = [1_000, 10_000, 100_000, 1_000_000, 4_000_000, 10_000_00
 pub const SEED: u64 = 1;
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
+    if let [before, now] = args.compare.as_slice() {
+        compare::run(before, now)?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let pictures = args.options.each(Prepare::Gpu, &args.methods)?;
     let picture = &pictures[0].1;
     args.check(picture)?;
@@ -140,6 +161,10 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     }
     if let Some(path) = &args.output {
         report::write(path, args, picture, &gpu.info, &runs)?;
+        args.show(&format!("wrote {}", path.display()))?;
+    }
+    if let Some(path) = &args.trace {
+        outputs::write(path, &trace::of(&runs, &gpu.info.label())?)?;
         args.show(&format!("wrote {}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
@@ -272,5 +297,6 @@ fn measure(
         sum: frames.iter().map(|f| total(f, false)).collect(),
         preparation: frames.iter().map(|f| total(f, true)).collect(),
         memory: session.renderer.memory(),
+        frames,
     })
 }

@@ -1,0 +1,69 @@
+//! Frames as a trace that Perfetto (ui.perfetto.dev) and Chrome's `about:tracing` show: the Trace Event Format, one process for
+//! each scene and method, and in it frames, their parts and their passes, one in the other.
+
+use super::Run;
+use meniscus::profile::{FrameTimes, PassTime};
+use serde_json::{Value, json};
+
+/// Between frames whose clock does not say how far they are apart, in milliseconds.
+const GAP: f64 = 1.0;
+
+/// All of it as JSON, zones in the order of their begin and, of those that begin together, the longer first.
+pub fn of(runs: &[Run], device: &str) -> Result<Vec<u8>, serde_json::Error> {
+    let mut events = Vec::new();
+    for (process, run) in runs.iter().enumerate() {
+        let name = format!("{}, {}", run.scene, run.method);
+        events.push(json!({"ph": "M", "name": "process_name", "pid": process, "tid": 0, "args": {"name": name}}));
+        events.push(json!({"ph": "M", "name": "thread_name", "pid": process, "tid": 0, "args": {"name": device}}));
+        let mut zones: Vec<_> = starts(&run.frames).into_iter().zip(&run.frames).flat_map(zones).collect();
+        zones.sort_by(|a, b| a.begin.total_cmp(&b.begin).then(b.ms.total_cmp(&a.ms)));
+        events.extend(zones.iter().map(|zone| zone.event(process)));
+    }
+    serde_json::to_vec(&json!({"displayTimeUnit": "ms", "traceEvents": events}))
+}
+
+/// When frames begin, in milliseconds after the first.
+fn starts(frames: &[FrameTimes]) -> Vec<f64> {
+    let (mut start, mut all) = (0.0, Vec::new());
+    for (i, frame) in frames.iter().enumerate() {
+        if let Some(before) = i.checked_sub(1).map(|k| &frames[k]) {
+            let apart = (frame.begin_ns - before.begin_ns) * 1e-6;
+            // A clock of few bits begins anew.
+            start += if apart >= before.span_ms { apart } else { before.span_ms + GAP };
+        }
+        all.push(start);
+    }
+    all
+}
+
+struct Zone {
+    name: String,
+    kind: &'static str,
+    begin: f64,
+    ms: f64,
+}
+
+impl Zone {
+    fn event(&self, process: usize) -> Value {
+        let (ts, dur) = (1e3 * self.begin, 1e3 * self.ms);
+        json!({"ph": "X", "name": self.name, "cat": self.kind, "pid": process, "tid": 0, "ts": ts, "dur": dur})
+    }
+}
+
+/// Of one frame: itself, runs of passes of one part, and passes.
+fn zones((start, frame): (f64, &FrameTimes)) -> Vec<Zone> {
+    let mut all = vec![Zone { name: "frame".into(), kind: "frame", begin: start, ms: frame.span_ms }];
+    let end = |p: &PassTime| p.begin_ms + p.ms;
+    for passes in frame.passes.chunk_by(|a, b| a.part == b.part) {
+        let (begin, part) = (passes[0].begin_ms, passes[0].part);
+        let last = passes.iter().map(end).fold(begin, f64::max);
+        all.push(Zone { name: part.into(), kind: "part", begin: start + begin, ms: last - begin });
+        all.extend(passes.iter().map(|p| Zone {
+            name: p.name.clone(),
+            kind: "pass",
+            begin: start + p.begin_ms,
+            ms: p.ms,
+        }));
+    }
+    all
+}

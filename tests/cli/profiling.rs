@@ -1,0 +1,147 @@
+//! Figures for profilers: traces of frames, and what changed between two measurements.
+
+use crate::{Run, block, text};
+use serde_json::{Value, json};
+use std::{collections::BTreeSet, fs};
+
+const SMALL: [&str; 6] = ["--size", "64x48", "--frames", "3", "--warmup", "1"];
+
+fn read(run: &Run, name: &str) -> Value {
+    serde_json::from_slice(&fs::read(run.path(name)).expect("written")).expect("JSON")
+}
+
+/// Zones are in order, and each lies within the one it is nested in: frame, part, pass.
+#[test]
+fn a_trace_nests_passes_in_parts_in_frames() {
+    let run = Run::new();
+    let cloud = run.file("cloud.csv", block(0.0));
+    let args =
+        [&["bench", &cloud, "--methods", "field,imai16", "--trace", "trace.json", "-o", "b.json"], &SMALL[..]].concat();
+    run.succeeds(&args, &["b.json", "cloud.csv", "trace.json"]);
+    let (trace, figures) = (read(&run, "trace.json"), read(&run, "b.json"));
+    let events = trace["traceEvents"].as_array().expect("events");
+    let number = |e: &Value, key: &str| e[key].as_f64().unwrap_or_else(|| panic!("no {key} in {e}"));
+    for (process, measured) in figures["runs"].as_array().expect("runs").iter().enumerate() {
+        let own: Vec<_> = events.iter().filter(|e| e["pid"] == process).collect();
+        let name = own.iter().find(|e| e["name"] == "process_name").expect("a name");
+        assert!(name["args"]["name"].as_str().expect("text").ends_with(measured["method"].as_str().expect("text")));
+        let zones: Vec<_> = own.iter().filter(|e| e["ph"] == "X").collect();
+        assert!(zones.windows(2).all(|z| number(z[0], "ts") <= number(z[1], "ts")), "{zones:?}");
+        let frames: Vec<_> = zones.iter().filter(|z| z["cat"] == "frame").collect();
+        assert_eq!(frames.len(), 3);
+        let end = |z: &Value| number(z, "ts") + number(z, "dur") + 1e-3;
+        assert!(frames.windows(2).all(|f| end(f[0]) - 2e-3 < number(f[1], "ts")), "frames overlap: {frames:?}");
+        let within = |z: &Value, cat: &str| {
+            zones
+                .iter()
+                .any(|o| o["cat"] == cat && number(o, "ts") <= number(z, "ts") + 1e-3 && end(z) <= end(o) + 1e-3)
+        };
+        for zone in &zones {
+            match zone["cat"].as_str() {
+                Some("pass") => assert!(within(zone, "part"), "{zone} is in no part"),
+                Some("part") => assert!(within(zone, "frame"), "{zone} is in no frame"),
+                _ => {}
+            }
+        }
+        // Passes are those of the figures, and as long.
+        for pass in measured["passes"].as_array().expect("passes") {
+            let of: Vec<_> = zones.iter().filter(|z| z["cat"] == "pass" && z["name"] == pass["pass"]).collect();
+            let sum: f64 = of.iter().map(|z| number(z, "dur") * 1e-3).sum();
+            let ms = |q: &str| pass["ms"][q].as_f64().expect("a number");
+            // Of three frames two take the median or more, and the longest no more than this.
+            let (median, longest) = (ms("median_ms"), ms("median_ms") + (ms("p95_ms") - ms("median_ms")) / 0.9);
+            assert!(sum >= 1.999 * median && sum <= 2.0 * median + longest + 1e-3, "{pass}: {sum}");
+        }
+    }
+    run.refused(1, &["bench", &cloud, "--trace", "trace.txt"], &["trace.txt", ".json"]);
+    run.refused(1, &["bench", &cloud, "--trace", "a.json", "-o", "a.json"], &["a.json", "--trace"]);
+}
+
+/// A change within the noise is none; one beyond it is named, as is whatever was measured with something else.
+#[test]
+fn what_changed_is_told_from_noise() {
+    let run = Run::new();
+    let times = |median: f64| json!({"median_ms": median, "p5_ms": 0.9 * median, "p95_ms": 1.1 * median});
+    let figures = |walk: f64, sort: f64, more: &str, device: &str| {
+        let passes = [("sort", sort), ("walk", walk), (more, 1.0)];
+        let passes = passes.map(|(name, ms)| json!({"pass": name, "ms": times(ms)}));
+        let one = json!({"scene": "dam", "method": "field", "particles": 9, "settings": {"ior": 1.33}, "passes": passes,
+            "preparation": times(sort), "frame_span": times(walk + sort + 1.0), "bytes_per_particle": 85.0});
+        json!({"commit": "abc", "device": {"name": device}, "protocol": {"frames": 3}, "runs": [one]}).to_string()
+    };
+    let before = run.file("a.json", figures(10.0, 5.0, "old", "one"));
+    let compare = |now: &str| {
+        let output = run.command(&["bench", "--compare", &before, now]);
+        assert!(output.status.success(), "{}", text(&output));
+        text(&output)
+    };
+    let same = compare(&run.file("same.json", figures(11.0, 4.6, "old", "one")));
+    assert!(!["slower", "faster", "NOT THE SAME", "new", "gone"].iter().any(|word| same.contains(word)), "{same}");
+    let other = compare(&run.file("other.json", figures(20.0, 2.0, "fresh", "two")));
+    let row =
+        |name: &str| other.lines().find(|l| l.starts_with(name)).unwrap_or_else(|| panic!("no {name} in {other}"));
+    for (name, end) in
+        [("walk", "2.000  slower"), ("sort", "0.400  faster"), ("= frame", "slower"), ("fresh", "new"), ("old", "gone")]
+    {
+        assert!(row(name).ends_with(end), "{}", row(name));
+    }
+    assert!(row("NOT THE SAME device").contains("\"one\"") && other.contains("is \"two\""), "{other}");
+
+    let broken = run.file("broken.json", "{}");
+    run.refused(1, &["bench", "--compare", &before, &broken], &["broken.json", "commit", "bench -o"]);
+    run.refused(1, &["bench", "--compare", &before, "missing.json"], &["missing.json"]);
+    run.refused(2, &["bench", "--compare", &before], &["--compare"]);
+    run.refused(2, &["bench", "--compare", &before, &before, "--frames", "3"], &["--compare"]);
+}
+
+/// docs/figures.md names every field, and none that is not there.
+#[test]
+fn fields_of_figures_are_documented() {
+    fn names(value: &Value, open: &[&str], all: &mut BTreeSet<String>) {
+        match value {
+            Value::Array(values) => values.iter().for_each(|v| names(v, open, all)),
+            Value::Object(fields) => {
+                for (name, value) in fields {
+                    all.insert(name.clone());
+                    // What is in these has names of its own: of parts of a frame, of parameters, of scene files.
+                    if !open.contains(&name.as_str()) {
+                        names(value, open, all);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    let run = Run::new();
+    let cloud = run.file("cloud.csv", block(0.0));
+    let args = [&["bench", &cloud, "--scaling", "--max-particles", "10000", "-o"], &["b.json"][..], &SMALL].concat();
+    assert!(run.command(&args).status.success());
+    let mut found = BTreeSet::new();
+    names(&read(&run, "b.json"), &["parts", "settings", "units", "asked"], &mut found);
+    let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/figures.md")).expect("docs/figures.md");
+    let table = text.split("## JSON").nth(1).and_then(|t| t.split("## ").next()).expect("a section");
+    let rows = table.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+    let documented: BTreeSet<_> =
+        rows.flat_map(|path| path.rsplit('.').next()).map(|n| n.trim_end_matches("[]").to_owned()).collect();
+    assert_eq!(documented, found);
+    let args = [&["bench", &cloud, "-o", "b.csv"], &SMALL[..]].concat();
+    assert!(run.command(&args).status.success());
+    let mut csv = csv::Reader::from_path(run.path("b.csv")).expect("a table");
+    let heads = csv.headers().expect("heads").clone();
+    let columns = text.split("## CSV").nth(1).expect("a section");
+    for head in heads.iter().take(15) {
+        assert!(columns.contains(&format!("`{head}`")), "{head} is not in docs/figures.md");
+    }
+}
+
+/// What `bench` writes can be compared.
+#[test]
+fn figures_that_were_written_are_compared() {
+    let run = Run::new();
+    let cloud = run.file("cloud.csv", block(0.0));
+    let bench = |name: &str| run.command(&[&["bench", &cloud, "-o", name], &SMALL[..]].concat());
+    assert!(bench("a.json").status.success() && bench("b.json").status.success());
+    let output = run.command(&["bench", "--compare", "a.json", "b.json"]);
+    let said = text(&output);
+    assert!(output.status.success() && said.contains("= frame") && !said.contains("NOT THE SAME"), "{said}");
+}
