@@ -43,6 +43,9 @@ fn a_trace_nests_passes_in_parts_in_frames() {
                 _ => {}
             }
         }
+        // One after the other, as the device did them.
+        let passes: Vec<_> = zones.iter().filter(|z| z["cat"] == "pass").collect();
+        assert!(passes.windows(2).all(|p| end(p[0]) <= number(p[1], "ts") + 2e-3), "passes overlap: {passes:?}");
         // Passes are those of the figures, and as long.
         for pass in measured["passes"].as_array().expect("passes") {
             let of: Vec<_> = zones.iter().filter(|z| z["cat"] == "pass" && z["name"] == pass["pass"]).collect();
