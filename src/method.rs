@@ -38,20 +38,23 @@ pub(crate) struct Offers {
     pub half: bool,
     /// How fast the particles in front are.
     pub speeds: bool,
+    /// Surfaces beyond what the view shows.
+    pub beyond: bool,
 }
 
 impl Offers {
-    const WORDS: [&'static str; 6] = [
+    const WORDS: [&'static str; 7] = [
         "maps of depths",
         "the far side of the liquid",
         "the particles' own normals",
         "the liquid's thickness",
         "surfaces at half the picture's resolution",
         "the particles' speeds",
+        "surfaces that the view does not show (for trace_reflections above 0)",
     ];
 
-    fn all(self) -> [bool; 6] {
-        [self.maps, self.backs, self.normals, self.thickness, self.half, self.speeds]
+    fn all(self) -> [bool; 7] {
+        [self.maps, self.backs, self.normals, self.thickness, self.half, self.speeds, self.beyond]
     }
 
     /// What either of two asks for.
@@ -63,6 +66,7 @@ impl Offers {
             thickness: self.thickness || b.thickness,
             half: self.half || b.half,
             speeds: self.speeds || b.speeds,
+            beyond: self.beyond || b.beyond,
         }
     }
 }

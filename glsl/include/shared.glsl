@@ -322,6 +322,10 @@ struct Prepare {
 #define BALL_ROUNDING 0.001
 #define BALL_START 0.001
 
+// How many reflected rays of a pixel wait to be followed, and the least light for which one does, as a part of the pixel's.
+#define REFLECTIONS_WAITING 4
+#define REFLECTION_LEAST 0.015625
+
 // Push constants of the passes that build it. Points and lengths are in the units of the preparation (Prepare).
 struct FieldBuild {
     uint count;         // points

@@ -13,6 +13,7 @@ layout(constant_id = 1) const uint INTERNAL_REFLECTIONS = 4;
 layout(constant_id = 2) const bool EXACT_FRESNEL = false;
 layout(constant_id = 3) const bool ENCODE_SRGB = false;
 layout(constant_id = 4) const bool HOST_BACKGROUND = false; // only liquid is drawn, over what is there
+layout(constant_id = 5) const uint TRACE_REFLECTIONS = 0; // rays followed beside the view's, a pixel
 layout(push_constant) uniform PushBlock {
     uint slots;    // of the directory
     float ball;    // radius of a ball, in spacings
@@ -60,8 +61,10 @@ vec2 within_box(vec3 x, vec3 dir) {
     return vec2(max(max(begin.x, begin.y), max(begin.z, 0.0)), min(end.x, min(end.y, end.z)));
 }
 
-void write_pixel(vec3 color, int pattern, int outcome, Walk w) {
-    out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
+void write_color(vec3 color) { out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0); }
+
+// What is known of the view ray's own walk.
+void write_walk(int pattern, int outcome, Walk w) {
 #ifdef DEBUG
     out_walk = vec4(float(pattern), float(outcome), w.hits, w.length_inside);
     out_direction = vec4(w.dir, w.flipped);
@@ -76,6 +79,45 @@ vec3 light_from(vec3 x, vec3 dir) {
 #else
     return env_color(eye_dir);
 #endif
+}
+
+// A reflected ray that waits to be followed: where it begins, what share of the pixel's light it brings, and what it is in.
+struct Reflection {
+    vec3 x;
+    vec3 dir;
+    vec3 light; // none: there is no such ray
+    int within;
+    vec3 center;
+};
+Reflection waiting[REFLECTIONS_WAITING]; // the most important first
+const Reflection NO_REFLECTION = Reflection(vec3(0.0), vec3(0.0), vec3(0.0), AIR, vec3(0.0));
+float importance(Reflection r) { return max(r.light.x, max(r.light.y, r.light.z)); }
+
+vec3 light_of(Reflection r) {
+    vec3 light = vec3(0.0);
+    for (bool look = importance(r) > 0.0; look; look = false) light = r.light * light_from(r.x, r.dir);
+    return light;
+}
+
+// Has a reflected ray wait for its turn. The light of the one that is not to be followed: this one, or the least important
+// where there is no room.
+vec3 reflected_light(Reflection r) {
+    for (int i = 0; i < REFLECTIONS_WAITING; ++i) {
+        Reflection other = waiting[i];
+        bool before = importance(r) >= REFLECTION_LEAST && importance(r) > importance(other);
+        if (before) {
+            waiting[i] = r;
+            r = other;
+        }
+    }
+    return light_of(r);
+}
+
+Reflection next_reflection() {
+    Reflection next = waiting[0];
+    for (int i = 1; i < REFLECTIONS_WAITING; ++i) waiting[i - 1] = waiting[i];
+    waiting[REFLECTIONS_WAITING - 1] = NO_REFLECTION;
+    return next;
 }
 
 // Eqs. (6) to (8) of Imai16 at a wall: what the outside sends back is gathered, and the ray is bent, or
@@ -93,7 +135,8 @@ void meet(inout Walk w, Wall wall) {
     if (dot(bent, bent) > 0.0) {
         float before = -dot(dir, against), after = -dot(bent, against);
         float reflected = fresnel(entering ? before : after, entering ? after : before, frame.ior, EXACT_FRESNEL);
-        w.color += w.light * reflected * light_from(w.x, mirrored);
+        if (TRACE_REFLECTIONS == 0u) w.color += w.light * reflected * light_from(w.x, mirrored);
+        else w.color += reflected_light(Reflection(w.x + FIELD_NUDGE * against, mirrored, w.light * reflected, w.within, w.center));
         w.light *= 1.0 - reflected;
         w.dir = bent;
         w.within = entering ? wall.cls : AIR;
@@ -192,26 +235,50 @@ void main() {
     }
     if (wall.t == NONE || scene_hides(pixel, -to_eye(w.x).z)) {
         if (HOST_BACKGROUND) discard;
-        write_pixel(behind(pixel, eye_dir), PATTERN_NONE, stopped ? OUTCOME_NOT_CONVERGED : OUTCOME_NO_LIQUID, w);
+        write_color(behind(pixel, eye_dir));
+        write_walk(PATTERN_NONE, stopped ? OUTCOME_NOT_CONVERGED : OUTCOME_NO_LIQUID, w);
         return;
     }
     const uint volumes = REFRACTIONS == 1 ? 1u : REFRACTIONS / 2u, most = REFRACTIONS + INTERNAL_REFLECTIONS + uint(MOST_HAND_OVERS);
-    bool done = false;
-    for (uint i = 0u; i < most && !done; ++i) {
-        if (!straight) meet(w, wall);
-        done = REFRACTIONS == 1 || w.outcome != OUTCOME_HIT || (w.within == AIR && w.volumes == volumes);
-        if (!done) {
-            straight = go_on(w, block, wall);
-            done = w.outcome != OUTCOME_HIT;
-        }
+    if (TRACE_REFLECTIONS > 0u) {
+        for (int i = 0; i < REFLECTIONS_WAITING; ++i) waiting[i] = NO_REFLECTION;
     }
-    int outcome = done ? w.outcome : OUTCOME_NOT_CONVERGED;
-    if (outcome == OUTCOME_NO_LIQUID) outcome = OUTCOME_HIT; // no second volume
+    // The view ray, then reflected ones, each with as many refractions and reflections of its own.
+    for (uint traced = 0u;; ++traced) {
+        bool done = false;
+        for (uint i = 0u; i < most && !done; ++i) {
+            if (!straight) meet(w, wall);
+            done = REFRACTIONS == 1 || w.outcome != OUTCOME_HIT || (w.within == AIR && w.volumes == volumes);
+            if (!done) {
+                straight = go_on(w, block, wall);
+                done = w.outcome != OUTCOME_HIT;
+            }
+        }
 #ifdef SCENE
-    if (w.outcome == OUTCOME_SCENE) w.color += w.light * scene_light(w.scene_pixel);
-    else
+        if (w.outcome == OUTCOME_SCENE) w.color += w.light * scene_light(w.scene_pixel);
+        else
 #endif
-    w.color += w.light * light_from(w.x, w.dir);
-    int pattern = w.second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + w.second;
-    write_pixel(w.color, pattern, outcome, w);
+        w.color += w.light * light_from(w.x, w.dir);
+        if (traced == 0u) {
+            int outcome = done ? w.outcome : OUTCOME_NOT_CONVERGED;
+            if (outcome == OUTCOME_NO_LIQUID) outcome = OUTCOME_HIT; // no second volume
+            int pattern = w.second < 0 ? PATTERN_SPLASH + first : PATTERN_SPLASH_SPLASH + 2 * first + w.second;
+            write_walk(pattern, outcome, w);
+        }
+        if (TRACE_REFLECTIONS == 0u || traced == TRACE_REFLECTIONS || importance(waiting[0]) == 0.0) break;
+        Reflection next = next_reflection();
+        w.x = next.x;
+        w.dir = next.dir;
+        w.light = next.light;
+        w.within = next.within;
+        w.center = next.center;
+        w.outcome = OUTCOME_HIT;
+        w.volumes = w.within == AIR ? 0u : 1u;
+        w.bounces = 0u;
+        straight = true;
+    }
+    if (TRACE_REFLECTIONS > 0u) {
+        for (int i = 0; i < REFLECTIONS_WAITING; ++i) w.color += light_of(waiting[i]);
+    }
+    write_color(w.color);
 }

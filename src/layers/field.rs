@@ -71,7 +71,7 @@ pub(crate) struct Volume {
 
 impl Layering for Field {
     fn offers(&self) -> Offers {
-        Offers { backs: true, ..Offers::default() }
+        Offers { backs: true, beyond: true, ..Offers::default() }
     }
 
     fn kind(&self) -> Kind<'_> {

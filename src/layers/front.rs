@@ -27,7 +27,7 @@ parameters! {
 
 impl Layering for Front {
     fn offers(&self) -> Offers {
-        Offers { maps: true, backs: false, normals: true, thickness: true, half: true, speeds: true }
+        Offers { maps: true, normals: true, thickness: true, half: true, speeds: true, ..Offers::default() }
     }
 
     fn kind(&self) -> Kind<'_> {

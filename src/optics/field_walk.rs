@@ -9,8 +9,13 @@ use crate::{
     shader::{FIELD_TILE, FIELD_TILES_COMP, FIELD_WALK_FRAG},
 };
 
-/// The draw of the walk in tiles of the view that have liquid, but for what the optics call for; and these tiles.
-pub(super) fn draw(plan: &mut Plan, scene: &Scene, field: &Volume) -> (Tiles, (Call, Vertices)) {
+/// The draw of the walk in tiles of the view that have liquid, but for what all walks' optics call for; and these tiles.
+pub(super) fn draw(
+    plan: &mut Plan,
+    scene: &Scene,
+    field: &Volume,
+    trace_reflections: u32,
+) -> (Tiles, (Call, Vertices)) {
     let tiles = Tiles::empty(plan, "field tiles", "field tiles", 2, FIELD_TILE);
     let bounds = Call::compute(&FIELD_TILES_COMP)
         .read("head", field.head)
@@ -36,6 +41,7 @@ pub(super) fn draw(plan: &mut Plan, scene: &Scene, field: &Volume) -> (Tiles, (C
         .read("balls", field.balls)
         .read("tiles", tiles.bounds)
         .constant("TEXELS", texels)
+        .constant("TRACE_REFLECTIONS", trace_reflections)
         .push("slots", field.build.slots)
         .push("ball", field.build.ball)
         .push("spacing", field.spacing);

@@ -13,7 +13,7 @@ walk_parameters! {
 
 impl Shading for Four {
     fn asks(&self) -> Offers {
-        Offers { backs: true, ..Offers::default() }
+        Offers { backs: true, beyond: self.trace_reflections > 0, ..Offers::default() }
     }
 
     fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
@@ -23,6 +23,7 @@ impl Shading for Four {
 
 impl From<Four> for Walk {
     fn from(p: Four) -> Walk {
-        Walk { refractions: 4, internal_reflections: p.internal_reflections, fresnel: p.fresnel }
+        let Four { internal_reflections, fresnel, trace_reflections } = p;
+        Walk { refractions: 4, internal_reflections, fresnel, trace_reflections }
     }
 }

@@ -13,7 +13,7 @@ walk_parameters! {
 
 impl Shading for Two {
     fn asks(&self) -> Offers {
-        Offers { backs: true, ..Offers::default() }
+        Offers { backs: true, beyond: self.trace_reflections > 0, ..Offers::default() }
     }
 
     fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
@@ -23,6 +23,7 @@ impl Shading for Two {
 
 impl From<Two> for Walk {
     fn from(p: Two) -> Walk {
-        Walk { refractions: 2, internal_reflections: p.internal_reflections, fresnel: p.fresnel }
+        let Two { internal_reflections, fresnel, trace_reflections } = p;
+        Walk { refractions: 2, internal_reflections, fresnel, trace_reflections }
     }
 }

@@ -24,6 +24,9 @@ macro_rules! walk_parameters {
                 internal_reflections: u32 = 4, "", "0 to 64" => |n| *n <= 64;
                 /// Reflectance (Imai16: Schlick's)
                 fresnel: Fresnel = Fresnel::Schlick, "", "schlick (Schlick's approximation) or exact" => |_| true;
+                /// Reflected rays a pixel that are followed, which may meet the liquid again; the others bring back what is infinitely
+                /// far away. In a density field alone
+                trace_reflections: u32 = 0, "", "0 to 16" => |n| *n <= 16;
             }
         }
     };
@@ -39,6 +42,8 @@ pub struct Walk {
     pub internal_reflections: u32,
     /// Reflectance.
     pub fresnel: Fresnel,
+    /// Reflected rays followed in each pixel, in a density field.
+    pub trace_reflections: u32,
 }
 
 impl Walk {
@@ -55,7 +60,7 @@ impl Walk {
 
     pub(super) fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
         let liquid = match (&surfaces.field, surfaces.tiles) {
-            (Some(field), _) => Some(field_walk::draw(plan, scene, field)),
+            (Some(field), _) => Some(field_walk::draw(plan, scene, field, self.trace_reflections)),
             (None, Some(tiles)) => Some((tiles, self.maps(plan, scene, surfaces, &tiles))),
             (None, None) => None,
         };

@@ -15,7 +15,7 @@ use crate::{
     shader::{
         BOX_MARGIN, CLASS_BODY, CLASS_SPLASH, FIELD_BRICK, FIELD_NUDGE, OUTCOME_HIT, OUTCOME_NO_LIQUID,
         OUTCOME_NO_WALL, OUTCOME_REFLECTION_LIMIT, OUTCOME_SCENE, PATTERN_NONE, PATTERN_SPLASH, PATTERN_SPLASH_SPLASH,
-        SPLASH_RADIUS, WETTING_FLAT, WETTING_GAP,
+        REFLECTION_LEAST, REFLECTIONS_WAITING, SPLASH_RADIUS, WETTING_FLAT, WETTING_GAP,
     },
 };
 use glam::{DVec3, IVec3, Mat3, Vec3, Vec4Swizzles};
@@ -124,6 +124,15 @@ impl Liquid {
     }
 }
 
+/// A reflected ray that waits to be followed.
+#[derive(Clone, Copy)]
+struct Reflection {
+    x: DVec3,
+    dir: DVec3,
+    light: Vec3,
+    within: Option<Liquid>,
+}
+
 struct Walker<'a> {
     field: &'a Field<'a>,
     /// The frame and the host's scene; of its maps none is looked at.
@@ -138,6 +147,8 @@ struct Walker<'a> {
     length: f64,
     bounces: u32,
     on_scene: Option<[usize; 2]>,
+    /// The most important first.
+    waiting: Vec<Reflection>,
 }
 
 impl Walker<'_> {
@@ -170,10 +181,10 @@ impl Walker<'_> {
         self.view.in_view(self.eye(x))
     }
 
-    fn background(&self, dir: DVec3) -> Vec3 {
+    fn background(&self, x: DVec3, dir: DVec3) -> Vec3 {
         let dir = self.rotation() * dir;
-        match self.in_view(self.x) {
-            true => self.view.background(self.environment, self.eye(self.x), dir),
+        match self.in_view(x) {
+            true => self.view.background(self.environment, self.eye(x), dir),
             false => env_color(self.environment, Mat3::from_mat4(self.view.frame.eye_to_env).as_dmat3() * dir),
         }
     }
@@ -185,6 +196,21 @@ impl Walker<'_> {
         }
         let ray = Ray::new(self.view.frame, self.eye(self.x), self.rotation() * self.dir).up_to(t * self.field.spacing);
         self.view.meets_scene(&ray).map(|(t, pixel)| (t / self.field.spacing, pixel))
+    }
+
+    /// Has a reflected ray wait, if it matters enough; of too many the least important is not followed.
+    fn reflects(&mut self, ray: Reflection) {
+        let importance = |r: &Reflection| r.light.max_element();
+        let mut rest = ray;
+        if self.settings.trace_reflections > 0 && importance(&ray) >= REFLECTION_LEAST {
+            let at = self.waiting.partition_point(|r| importance(r) >= importance(&ray));
+            self.waiting.insert(at, ray);
+            if self.waiting.len() <= REFLECTIONS_WAITING as usize {
+                return;
+            }
+            rest = self.waiting.pop().expect("it has some");
+        }
+        self.color += rest.light * self.background(rest.x, rest.dir);
     }
 
     /// Meets a wall: whether the ray goes through.
@@ -205,7 +231,9 @@ impl Walker<'_> {
         let (before, after) = (-self.dir.dot(against), -bent.dot(against));
         let (air, water) = if entering { (before, after) } else { (after, before) };
         let reflected = fresnel(air as f32, water as f32, ior, self.settings.fresnel == Fresnel::Exact);
-        self.color += self.light * reflected * self.background(mirrored);
+        let x = self.x + f64::from(FIELD_NUDGE) * against;
+        let within = (!entering).then_some(liquid);
+        self.reflects(Reflection { x, dir: mirrored, light: self.light * reflected, within });
         self.light *= 1.0 - reflected;
         self.dir = bent;
         self.x -= f64::from(FIELD_NUDGE) * against;
@@ -273,16 +301,18 @@ impl Walker<'_> {
         }
     }
 
-    /// All volumes; the class of the second, and how the walk ends.
-    fn volumes(&mut self, mut liquid: Liquid) -> (Option<u32>, u32) {
+    /// From within a volume or from outside through all of them; the class of the second, and how the walk ends.
+    fn volumes(&mut self, mut within: Option<Liquid>) -> (Option<u32>, u32) {
         let mut second = None;
-        let volumes = self.settings.refractions / 2;
-        for volume in 1..=volumes {
-            if let Err(outcome) = self.through(liquid) {
+        let mut volume = u32::from(within.is_some());
+        loop {
+            if let Some(liquid) = within
+                && let Err(outcome) = self.through(liquid)
+            {
                 return (second, outcome);
             }
-            if volume == volumes {
-                break;
+            if volume == self.settings.refractions / 2 {
+                return (second, OUTCOME_HIT);
             }
             let Some((next, t)) = self.enter() else { return (second, OUTCOME_HIT) };
             if let Some((t, pixel)) = self.meets_scene(t) {
@@ -292,9 +322,35 @@ impl Walker<'_> {
             }
             self.x += t * self.dir;
             self.meet(next, true);
-            (second, liquid) = (Some(next.class()), next);
+            volume += 1;
+            second = second.or((volume == 2).then(|| next.class()));
+            within = Some(next);
         }
-        (second, OUTCOME_HIT)
+    }
+
+    /// What a ray brings back from where it ends.
+    fn end(&mut self) {
+        let light = match self.on_scene {
+            Some(pixel) => self.view.scene_light(pixel),
+            None => self.background(self.x, self.dir),
+        };
+        self.color += self.light * light;
+    }
+
+    /// Reflected rays, the most important first; those that are not followed bring back what is far away.
+    fn reflections(&mut self) {
+        for _ in 0..self.settings.trace_reflections {
+            if self.waiting.is_empty() {
+                return;
+            }
+            let Reflection { x, dir, light, within } = self.waiting.remove(0);
+            (self.x, self.dir, self.light, self.bounces, self.on_scene) = (x, dir, light, 0, None);
+            self.volumes(within);
+            self.end();
+        }
+        for r in std::mem::take(&mut self.waiting) {
+            self.color += r.light * self.background(r.x, r.dir);
+        }
     }
 }
 
@@ -317,6 +373,7 @@ pub fn walk(field: &Field, view: &Maps, settings: &Rays, environment: &Equirect,
         length: 0.0,
         bounces: 0,
         on_scene: None,
+        waiting: Vec::new(),
     };
     let around = match field.at(walker.x) >= 0.0 {
         true => Some(Liquid::Body),
@@ -336,10 +393,11 @@ pub fn walk(field: &Field, view: &Maps, settings: &Rays, environment: &Equirect,
     if around.is_none() {
         walker.meet(first, true);
     }
-    let (second, outcome) = if settings.refractions == 1 { (None, OUTCOME_HIT) } else { walker.volumes(first) };
-    let behind = walker.on_scene.map_or_else(|| walker.background(walker.dir), |pixel| view.scene_light(pixel));
+    let (second, outcome) = if settings.refractions == 1 { (None, OUTCOME_HIT) } else { walker.volumes(Some(first)) };
     let first = first.class();
     let pattern = second.map_or(PATTERN_SPLASH + first, |second| PATTERN_SPLASH_SPLASH + 2 * first + second);
-    let Walker { hits, length, dir, color, light, .. } = walker;
-    Walk { pattern, outcome, hits, length, direction: dir, color: color + light * behind }
+    let Walker { hits, length, dir: direction, .. } = walker;
+    walker.end();
+    walker.reflections();
+    Walk { pattern, outcome, hits, length, direction, color: walker.color }
 }

@@ -1,6 +1,7 @@
 //! The walk through a density field against its twin, which walks in the field that the device has built.
 
 use crate::{
+    analytic::{self, Pixel, pixels, snell},
     background::{HostScene, painted},
     drivers::SKY,
     field::{prepared, settings, words},
@@ -14,10 +15,10 @@ use meniscus::{
     prepare::{Input, Options, points},
     shader::{
         Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED, OUTCOME_REFLECTION_LIMIT,
-        OUTCOME_SCENE, PATTERN_BODY, PATTERN_NONE, PATTERN_SPLASH,
+        OUTCOME_SCENE, PATTERN_BODY, PATTERN_NONE, PATTERN_SPLASH, REFLECTION_LEAST, SPLASH_RADIUS,
     },
     twin::{
-        background::Scene,
+        background::{Scene, env_color},
         field_walk::{Field as Twin, walk},
         walk::Walk,
         walls::{Map, Maps},
@@ -193,6 +194,26 @@ fn rays_are_walked_as_the_twin_walks_them() {
     });
 }
 
+/// Followed reflections are the twin's, be there few of them or more than wait; the view ray's own walk stays what it was.
+#[test]
+fn reflections_are_followed_as_the_twin_follows_them() {
+    each_driver(|driver| {
+        let plain = case(Field::default(), 4, 4);
+        let plain = Case { settings: plain.settings.absorption(Vec3::new(0.2, 1.5, 3.0)), ..plain };
+        let before = walked(&shoot(driver, &plain));
+        for count in [1, 16] {
+            let case = Case { settings: plain.settings.tracing(count), ..plain.clone() };
+            let after = compare(driver, &case, 11);
+            let own = |w: &Walk| Walk { color: Vec3::ZERO, ..*w };
+            assert!(before.iter().map(own).eq(after.iter().map(own)), "{}: another walk", driver.name);
+            let changed = before.iter().zip(&after).filter(|(a, b)| (a.color - b.color).abs().max_element() > 0.02);
+            let changed = changed.count();
+            println!("  {count} followed: {changed} pixels changed");
+            assert!(changed > 500, "{}: {count} followed change {changed} pixels", driver.name);
+        }
+    });
+}
+
 /// Balls that stand in the body's face hand rays over to it: between liquid and liquid there is no wall.
 #[test]
 fn balls_in_the_bodys_face_hand_rays_over() {
@@ -254,7 +275,10 @@ fn the_hosts_scene_is_met() {
     let painted = painted(SIZE, blocks);
     let Layers::Field(own) = case.settings.method.layers else { unreachable!("a field") };
     each_driver(|driver| {
-        for background in [Background::Environment, Background::Host] {
+        for (background, tracing) in
+            [(Background::Environment, 0), (Background::Host, 0), (Background::Environment, 3), (Background::Host, 3)]
+        {
+            let case = Case { settings: case.settings.tracing(tracing), ..case.clone() };
             let images = HostScene::new(driver.gpu(), &case.camera, SIZE, &painted);
             let shot = driver.shoot_before(&case, images.input(), background);
             let depth: Vec<f64> = painted.0.iter().map(|d| d / shot.space.radius).collect();
@@ -264,7 +288,7 @@ fn the_hosts_scene_is_met() {
             let pair = |i| (i, found[i], walk_in(&shot, &bricks, own, &case, &shot.frame, Some(scene), i));
             let all: Vec<_> = chosen.map(pair).collect();
             let all: Vec<&Pair> = all.iter().collect();
-            println!("  {background:?}:");
+            println!("  {background:?}, {tracing} reflections followed:");
             let none = |w: &Walk| w.pattern == PATTERN_NONE;
             at_least("what is hidden", driver, &all, 0.998, |a, b| none(a) == none(b));
             let (beside, liquid): (Vec<&Pair>, Vec<&Pair>) = all.into_iter().partition(|(_, _, twin)| none(twin));
@@ -278,6 +302,123 @@ fn the_hosts_scene_is_met() {
             if background == Background::Environment {
                 at_least("colour beside liquid", driver, &beside, 0.998, close);
             }
+        }
+    });
+}
+
+const RADIUS: f64 = 0.05;
+const IOR: f64 = 1.333;
+
+/// Where a ray that begins outside a ball meets it, if it does; the normal there.
+fn meets(center: DVec3, x: DVec3, dir: DVec3) -> Option<(f64, DVec3)> {
+    let (q, radius) = (x - center, f64::from(SPLASH_RADIUS) * RADIUS);
+    let square = q.dot(dir).powi(2) - q.length_squared() + radius * radius;
+    let t = -q.dot(dir) - square.sqrt();
+    (square > 0.0 && t > 1e-6).then(|| (t, (q + t * dir) / radius))
+}
+
+/// Fresnel's equations for a ray from the air, both polarisations alike; and the ray in the water.
+fn reflectance(dir: DVec3, n: DVec3) -> (f32, DVec3) {
+    let bent = snell(dir, n, 1.0 / IOR).expect("there is no critical angle into water");
+    let (air, water) = (-dir.dot(n), -bent.dot(n));
+    let [s, p] = [(air, water), (water, air)].map(|(a, b)| ((a - IOR * b) / (a + IOR * b)).powi(2));
+    (0.5 * (s + p) as f32, bent)
+}
+
+fn sky(shot: &Shot, dir: DVec3) -> Vec3 {
+    let [to_env, view] = [shot.frame.eye_to_env, shot.frame.view].map(|m| glam::Mat3::from_mat4(m).as_dmat3());
+    env_color(&SKY, to_env * view * dir)
+}
+
+/// Lone balls, drawn with so many reflections followed.
+fn balls(driver: &Driver, centers: &[Vec3], tracing: u32, absorption: Vec3) -> (Shot, Vec<Pixel>) {
+    let mut settings = settings(Field::default(), "four").tracing(tracing).absorption(absorption);
+    settings.method.set("fresnel", "exact").expect("a parameter");
+    let camera = analytic::view(Vec3::new(0.1, 0.2, 0.6), Vec3::new(0.05, 0.0, 0.0), 30.0);
+    let empty = crate::shape::empty(RADIUS as f32);
+    let case = Case { settings, camera, size: analytic::SIZE, ..empty };
+    let case = prepared(centers, &case);
+    let (shot, _) = crate::field::shoot(driver, centers, &case);
+    let pixels = pixels(&case, &shot);
+    (shot, pixels)
+}
+
+/// On balls that let nothing through: the product of what they reflect, from ball to ball as often as is asked for.
+#[test]
+fn black_balls_are_seen_in_each_other() {
+    let centers = [Vec3::ZERO, Vec3::new(0.15, 0.0, 0.0), Vec3::new(0.05, -0.05, 0.125)];
+    each_driver(|driver| {
+        for tracing in [0, 1, 2, 5] {
+            let (shot, pixels) = balls(driver, &centers, tracing, Vec3::splat(2000.0));
+            let (mut bad, mut seen) = (Vec::new(), [0; 8]);
+            for p in pixels {
+                let (mut x, mut dir, mut light, mut met) = (p.eye, p.dir, 1.0, 0);
+                while met <= tracing && light >= REFLECTION_LEAST {
+                    let all = centers.iter().filter_map(|c| meets(c.as_dvec3(), x, dir));
+                    let Some((t, n)) = all.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+                    light *= reflectance(dir, n).0;
+                    (x, dir) = (x + t * dir, dir - 2.0 * dir.dot(n) * n);
+                    met += 1;
+                }
+                seen[met as usize] += 1;
+                let (found, wanted) = (Vec3::from(shot.picture[p.index]), light * sky(&shot, dir));
+                if met > 0 && (found - wanted).abs().max_element() > 0.005 + 0.02 * wanted.max_element() {
+                    bad.push((p.index, met, found, wanted));
+                }
+            }
+            println!("  {tracing} followed: pixels by balls met {seen:?}, {} bad: {:?}", bad.len(), bad.first());
+            let liquid: usize = seen[1..].iter().sum();
+            assert!(liquid > 5000 && bad.len() * 100 <= liquid, "{}: {} of {liquid}", driver.name, bad.len());
+            let again = seen[2..].iter().sum::<usize>() > 300;
+            assert_eq!(again, tracing > 0, "{}: {seen:?}", driver.name);
+        }
+    });
+}
+
+/// In a clear ball light goes round and round, and some leaves it each time: what that adds to a picture without.
+#[test]
+fn light_goes_round_in_a_clear_ball() {
+    let absorption = Vec3::new(0.5, 1.0, 4.0);
+    let radius = f64::from(SPLASH_RADIUS);
+    each_driver(|driver| {
+        let (plain, _) = balls(driver, &[Vec3::ZERO], 0, absorption);
+        // The first that is followed is what the ball's outside reflects, and meets nothing.
+        for tracing in [1, 2, 4] {
+            let (shot, pixels) = balls(driver, &[Vec3::ZERO], tracing, absorption);
+            let (mut bad, mut by_rounds) = (Vec::new(), [0; 8]);
+            for p in pixels {
+                let Some((_, mut n)) = meets(DVec3::ZERO, p.eye, p.dir) else { continue };
+                let (reflected, mut dir) = reflectance(p.dir, n);
+                let chord = -2.0 * dir.dot(n) * radius;
+                let through = (-shot.frame.absorption * chord as f32).exp();
+                let (mut light, mut rounds, mut more) = (Vec3::splat(1.0 - reflected), 0, Vec3::ZERO);
+                loop {
+                    n += chord * dir / radius;
+                    light *= through * reflected;
+                    dir -= 2.0 * dir.dot(n) * n;
+                    if rounds + 1 >= tracing || light.max_element() < REFLECTION_LEAST {
+                        break;
+                    }
+                    // Instead of what this direction brings, what comes in at the chord's other end and what is reflected there.
+                    let end = n + chord * dir / radius;
+                    let out = snell(dir, -end, IOR).expect("what came in gets out");
+                    let next = dir - 2.0 * dir.dot(end) * end;
+                    let there = (1.0 - reflected) * sky(&shot, out) + reflected * sky(&shot, next);
+                    more += light * (through * there - sky(&shot, dir));
+                    rounds += 1;
+                }
+                by_rounds[rounds as usize] += 1;
+                let found = Vec3::from(shot.picture[p.index]) - Vec3::from(plain.picture[p.index]);
+                // Rays go on from 0.003 of a radius beside their walls, and at an edge of the sky that is seen.
+                if (found - more).abs().max_element() > 0.002 + 0.1 * more.abs().max_element() {
+                    bad.push((p.index, rounds, found, more));
+                }
+            }
+            println!("  {tracing} followed: pixels by rounds {by_rounds:?}, {} bad: {:?}", bad.len(), bad.first());
+            let liquid: usize = by_rounds.iter().sum();
+            assert!(liquid > 2000 && bad.len() * 10 <= liquid, "{}: {} of {liquid}", driver.name, bad.len());
+            let round = by_rounds.iter().rposition(|n| *n > 20);
+            assert_eq!(round, Some(tracing as usize - 1), "{}: {by_rounds:?}", driver.name);
         }
     });
 }

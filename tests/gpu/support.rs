@@ -241,6 +241,8 @@ pub trait Choose {
     /// Light that bends at up to 1, 2 or 4 surfaces, and is reflected inside so often.
     fn refractions(&self, count: u32) -> Settings;
     fn reflections(&self, count: u32) -> Settings;
+    /// So many reflected rays are followed.
+    fn tracing(&self, count: u32) -> Settings;
     fn iterations(&self, count: u32) -> Settings;
     fn absorption(&self, absorption: Vec3) -> Settings;
     fn quads_only(&self, quads: bool) -> Settings;
@@ -276,6 +278,10 @@ impl Choose for Settings {
             _ => {}
         };
         with(self, |s| change(&mut s.method.optics))
+    }
+
+    fn tracing(&self, count: u32) -> Settings {
+        with(self, |s| s.method.set("trace_reflections", &count.to_string()).expect("a parameter"))
     }
 
     fn iterations(&self, count: u32) -> Settings {
