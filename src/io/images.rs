@@ -181,17 +181,44 @@ fn extension(path: &Path) -> Option<String> {
 
 /// The bytes of a picture from linear RGB, as the extension of its name says: .png (sRGB, 8 bits) or .exr (linear, float).
 pub fn encode_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<Vec<u8>, ImageError> {
+    encode_labelled(path, size, rgb, None)
+}
+
+/// [`encode_picture`] with a line of Latin letters in the file that says what it is of, for [`label`].
+pub fn encode_labelled(
+    path: &Path,
+    size: [u32; 2],
+    rgb: &[[f32; 3]],
+    label: Option<&str>,
+) -> Result<Vec<u8>, ImageError> {
     match extension(path).as_deref() {
-        Some("png") => {
-            let bytes: Vec<_> = rgb.iter().map(|c| c.map(crate::srgb::srgb_byte)).collect();
-            encode_srgb_png(path, size, &bytes)
-        }
-        Some("exr") => exr::write(size, rgb).map_err(|e| {
-            let source = image::ImageError::IoError(std::io::Error::other(e));
-            ImageError::Encode { path: path.into(), source }
-        }),
+        Some("png") => png::write(size, &srgb_bytes(rgb), label).map_err(failed(path)),
+        Some("exr") => exr::write(size, rgb, label).map_err(failed(path)),
         _ => Err(ImageError::Extension(path.into())),
     }
+}
+
+/// What an encoder says, with the picture's name.
+fn failed<E: std::error::Error + Send + Sync + 'static>(path: &Path) -> impl Fn(E) -> ImageError {
+    |e| ImageError::Encode { path: path.into(), source: image::ImageError::IoError(std::io::Error::other(e)) }
+}
+
+/// Under what name a picture's file has its label.
+const LABEL: &str = "meniscus";
+
+/// What a picture's file says that it is of; nothing where it says nothing, is damaged, or is not there.
+pub fn label(path: &Path) -> Option<String> {
+    let read = || match extension(path).as_deref() {
+        Some("png") => png::label(path),
+        Some("exr") => exr::label(path),
+        _ => None,
+    };
+    guard::quietly(read).ok().flatten()
+}
+
+/// Linear RGB as sRGB with 8 bits, as .png files have it.
+pub fn srgb_bytes(rgb: &[[f32; 3]]) -> Vec<[u8; 3]> {
+    rgb.iter().map(|c| c.map(crate::srgb::srgb_byte)).collect()
 }
 
 /// A picture of sRGB bytes, row by row, as .png; `path` stands in messages.
@@ -199,9 +226,5 @@ pub fn encode_picture(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<V
 /// # Errors
 /// [`ImageError::Encode`].
 pub fn encode_srgb_png(path: &Path, size: [u32; 2], rgb: &[[u8; 3]]) -> Result<Vec<u8>, ImageError> {
-    let encode = |source| ImageError::Encode { path: path.into(), source };
-    let mut bytes = Cursor::new(Vec::new());
-    let image = image::RgbImage::from_raw(size[0], size[1], rgb.as_flattened().to_vec());
-    image.expect("one colour for each pixel").write_to(&mut bytes, ImageFormat::Png).map_err(encode)?;
-    Ok(bytes.into_inner())
+    png::write(size, rgb, None).map_err(failed(path))
 }

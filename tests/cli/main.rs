@@ -8,6 +8,7 @@ mod profiling;
 mod refusals;
 mod render;
 mod scenes;
+mod sequence;
 mod settings;
 mod signals;
 #[cfg(feature = "study")]

@@ -23,6 +23,7 @@ mod render;
 mod report;
 mod scene;
 mod scene_file;
+mod sequence;
 mod stats;
 #[cfg(feature = "study")]
 mod stress;
@@ -53,6 +54,8 @@ struct Cli {
 enum Command {
     /// Render particles to a picture.
     Render(Box<render::Args>),
+    /// Render the frames of a simulation to numbered pictures; goes on where it was ended
+    Sequence(Box<sequence::Args>),
     /// Measure what each pass takes.
     Bench(Box<bench::Args>),
     /// Path-trace the same scene off-line on the CPU: the truth that pictures are compared with
@@ -98,6 +101,7 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
     temporary::clean_up_on_signals()?;
     match command {
         Command::Render(args) => render::run(&args),
+        Command::Sequence(args) => sequence::run(&args),
         Command::Bench(args) => bench::run(&args),
         #[cfg(feature = "study")]
         Command::Truth(args) => truth::run(&args),

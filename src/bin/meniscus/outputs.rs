@@ -83,6 +83,23 @@ pub fn check(outputs: &[Named], dump: Option<&Path>, inputs: &[Named]) -> Result
     check_dump(folder, &place)
 }
 
+/// Refuses numbered pictures that cannot be, as [`check`] does: in the place of another file that is read or written.
+pub fn check_pictures(pictures: &[PathBuf], others: &[Named]) -> Result<(), OutputError> {
+    let mut places = std::collections::HashSet::new();
+    for path in pictures {
+        check_file(path)?;
+        places.insert(resolve(path)?);
+    }
+    for (other, path) in others {
+        // An input that is not there has an error message of its own.
+        let Ok(place) = resolve(path) else { continue };
+        if places.contains(&place) {
+            return Err(OutputError::Clash { path: (*path).into(), option: "one of the pictures (--output)", other });
+        }
+    }
+    Ok(())
+}
+
 /// Whether this is the program's own standard output, by its names or as the file that it was sent to.
 fn is_stdout(path: &Path) -> bool {
     let names = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
@@ -160,7 +177,6 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
 }
 
 /// Makes a folder, if it is not there, that several files are written into one after the other, and checks that they can be.
-#[cfg(feature = "study")]
 pub fn folder(path: &Path) -> Result<(), OutputError> {
     fs::create_dir_all(path).and_then(|()| temporary::try_out(&fs::canonicalize(path)?)).map_err(failed(path))
 }

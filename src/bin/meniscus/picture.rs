@@ -11,7 +11,7 @@ use meniscus::{
     io::{
         Budget,
         images::{self, ImageError},
-        particles::ReadError,
+        particles::ParticleFile,
     },
     prepare,
 };
@@ -144,10 +144,20 @@ impl Picture {
 
     /// Reads a particle file, or what is embedded, and prepares it.
     pub fn load(&self, file: Option<&Path>, prepare: Prepare) -> Result<Scene, Box<dyn std::error::Error>> {
-        Scene::load(self, file, prepare).map_err(|e| match file {
-            // Readers name their file; what comes after them does not know it.
-            Some(file) if !e.is::<ReadError>() => format!("{}: {e}", file.display()).into(),
-            _ => e,
+        self.prepared(Scene::read(self, file)?, file, prepare)
+    }
+
+    /// Prepares what [`Scene::read`] read of a file.
+    pub fn prepared(
+        &self,
+        read: (ParticleFile, usize),
+        file: Option<&Path>,
+        prepare: Prepare,
+    ) -> Result<Scene, Box<dyn std::error::Error>> {
+        // Readers name their file; what comes after them does not know it.
+        Scene::of(self, read, file, prepare).map_err(|e| match file {
+            Some(file) => format!("{}: {e}", file.display()).into(),
+            None => e,
         })
     }
 

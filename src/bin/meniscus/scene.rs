@@ -7,13 +7,18 @@ use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
     Class, Ellipsoid, Particles, Point, Settings,
     host::{Session, Upload},
-    io::particles::{Invalid, check_finite, read_bytes, read_within},
+    io::particles::{Invalid, ParticleFile, ReadError, check_finite, read_bytes, read_within},
     layers::Layers,
     prepare::{self, DensityField, DevicePositions, Input, Options, PrepareError, Report, Search},
     shader,
 };
 use serde::{Deserialize, Serialize};
-use std::{error::Error, path::Path, time::Duration};
+use std::{
+    error::Error,
+    path::Path,
+    sync::atomic::{AtomicBool, Ordering},
+    time::Duration,
+};
 
 /// The dam break that is rendered when no file is named; see assets/README.md.
 const EMBEDDED: &[u8] = include_bytes!("../../../assets/dam_break.bgeo");
@@ -66,10 +71,10 @@ impl Prepare {
 }
 
 impl Scene {
-    /// Reads a particle file, or what is embedded, and prepares it as the picture wants it.
-    pub fn load(picture: &Picture, source: Option<&Path>, prepare: Prepare) -> Result<Scene, Box<dyn Error>> {
+    /// Reads a particle file, or what is embedded; also says how many particles were left out of it.
+    pub fn read(picture: &Picture, source: Option<&Path>) -> Result<(ParticleFile, usize), ReadError> {
         let bar = spinner("reading particles");
-        let path = source.unwrap_or(Path::new("embedded dam_break.bgeo"));
+        let path = name(source);
         let mut file = match source {
             Some(path) => read_within(path, &picture.max_memory)?,
             None => read_bytes(path, EMBEDDED, &picture.max_memory)?,
@@ -77,9 +82,20 @@ impl Scene {
         let policy = if picture.drop_invalid { Invalid::Drop } else { Invalid::Reject };
         let dropped = check_finite(&mut file, policy, path)?;
         bar.finish_and_clear();
+        Ok((file, dropped))
+    }
 
+    /// Prepares what was read as the picture wants it.
+    pub fn of(
+        picture: &Picture,
+        (file, dropped): (ParticleFile, usize),
+        source: Option<&Path>,
+        prepare: Prepare,
+    ) -> Result<Scene, Box<dyn Error>> {
+        let path = name(source);
         let origin = origin(&file.positions);
         let positions: Vec<Vec3> = file.positions.iter().map(|p| (*p - origin).as_vec3()).collect();
+        drop(file.positions); // twice as large as what was made of them
         let (radius, radius_source) = match (picture.radius, file.radius, source) {
             (Some(r), _, _) => (r, "given"),
             (None, _, None) => (EMBEDDED_RADIUS, "embedded scene"),
@@ -206,6 +222,11 @@ impl Scene {
     }
 }
 
+/// What messages call the source of particles.
+fn name(source: Option<&Path>) -> &Path {
+    source.unwrap_or(Path::new("embedded dam_break.bgeo"))
+}
+
 /// What [`make`] gives.
 type Made = (Particles, Report, Option<Vec<f32>>, f64);
 
@@ -248,8 +269,18 @@ fn origin(positions: &[DVec3]) -> DVec3 {
     if middle.length() > 16.0 * (high - low).length() { middle.round() } else { DVec3::ZERO }
 }
 
+static ONE_BAR: AtomicBool = AtomicBool::new(false);
+
+/// From now on steps of the work show no bars of their own: there is one for all of it.
+pub fn one_bar() {
+    ONE_BAR.store(true, Ordering::Relaxed);
+}
+
 /// A bar for work that may take longer than a second; shown on terminals only.
 pub fn progress(length: u64, what: &'static str) -> ProgressBar {
+    if ONE_BAR.load(Ordering::Relaxed) {
+        return ProgressBar::hidden();
+    }
     let style = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} {eta}").expect("a constant template");
     let bar = ProgressBar::new(length).with_style(style).with_message(what);
     bar.enable_steady_tick(Duration::from_secs(1));
@@ -258,6 +289,9 @@ pub fn progress(length: u64, what: &'static str) -> ProgressBar {
 
 /// A spinner for work whose length is not known, on a terminal.
 pub fn spinner(what: &'static str) -> ProgressBar {
+    if ONE_BAR.load(Ordering::Relaxed) {
+        return ProgressBar::hidden();
+    }
     let bar = ProgressBar::new_spinner().with_message(what);
     bar.enable_steady_tick(Duration::from_secs(1));
     bar

@@ -117,7 +117,6 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Checks that files can be made in a folder.
-#[cfg(feature = "study")]
 pub fn try_out(folder: &Path) -> io::Result<()> {
     Temporary::file(folder).map(|_| ())
 }

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 use std::io::{BufRead, Seek};
+use std::path::Path;
 
 use exr::block::UncompressedBlock;
 use exr::math::Vec2;
@@ -10,6 +11,7 @@ use exr::meta::header::Header;
 use exr::prelude::f16;
 use rayon::prelude::*;
 
+use super::LABEL;
 use super::map::{Fault, Frame, Target};
 use crate::io::guard;
 
@@ -93,16 +95,28 @@ fn block_bytes(header: &Header) -> u64 {
 
 /// A picture of linear light, row by row, as 32-bit floats. The same picture has the same bytes: blocks, which are packed in
 /// parallel, come in the order of their rows.
-pub(super) fn write([width, height]: [u32; 2], rgb: &[[f32; 3]]) -> exr::error::Result<Vec<u8>> {
+pub(super) fn write([width, height]: [u32; 2], rgb: &[[f32; 3]], label: Option<&str>) -> exr::error::Result<Vec<u8>> {
     use exr::prelude::*;
     let size = Vec2(width as usize, height as usize);
     let color = |at: Vec2<usize>| <(f32, f32, f32)>::from(rgb[at.y() * size.width() + at.x()]);
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
-    let layer = Layer::new(size, LayerAttributes::default(), encoding, SpecificChannels::rgb(color));
+    let mut attributes = LayerAttributes::default();
+    attributes.other.extend(label.and_then(|l| Some((LABEL.into(), AttributeValue::Text(Text::new_or_none(l)?)))));
+    let layer = Layer::new(size, attributes, encoding, SpecificChannels::rgb(color));
     let mut bytes = std::io::Cursor::new(Vec::new());
     Image::from_layer(layer).write().to_buffered(&mut bytes)?;
     Ok(bytes.into_inner())
+}
+
+/// The label that [`write`] wrote.
+pub(super) fn label(path: &Path) -> Option<String> {
+    use exr::prelude::{AttributeValue, MetaData, Text};
+    let data = MetaData::read_from_file(path, false).ok()?;
+    match data.headers.first()?.own_attributes.other.get(&Text::from(LABEL))? {
+        AttributeValue::Text(text) => Some(text.to_string()),
+        _ => None,
+    }
 }
 
 /// Blocks of the full size in each direction.

@@ -1,9 +1,12 @@
-//! PNG environment maps, row by row, by png.
+//! PNG environment maps, row by row, and pictures, by png.
 
-use std::io::{BufRead, Seek};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Seek};
+use std::path::Path;
 
 use png::{ColorType, Decoder, Transformations};
 
+use super::LABEL;
 use super::map::{Fault, Frame, Target};
 use crate::srgb::decode_srgb;
 
@@ -59,4 +62,32 @@ impl From<png::DecodingError> for Fault {
             error => Fault::Corrupt(error.to_string()),
         }
     }
+}
+
+/// A picture of sRGB bytes, with a label if there is one.
+pub(super) fn write(
+    [width, height]: [u32; 2],
+    rgb: &[[u8; 3]],
+    label: Option<&str>,
+) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    encoder.set_filter(png::Filter::Adaptive);
+    if let Some(label) = label {
+        encoder.add_text_chunk(LABEL.into(), label.into())?;
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(rgb.as_flattened())?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The label that [`write`] wrote.
+pub(super) fn label(path: &Path) -> Option<String> {
+    let reader = Decoder::new(BufReader::new(File::open(path).ok()?)).read_info().ok()?;
+    let mut texts = reader.info().uncompressed_latin1_text.iter();
+    texts.find(|t| t.keyword == LABEL).map(|t| t.text.clone())
 }

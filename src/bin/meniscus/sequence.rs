@@ -1,0 +1,225 @@
+//! `meniscus sequence`: the frames of a simulation to numbered pictures, of which a finished one is not made again.
+//!
+//! Three threads: one reads and prepares the next frame, this one has the device draw, one encodes and writes. Each holds one
+//! frame, whatever their number.
+
+mod ahead;
+mod frames;
+mod kept;
+mod plan;
+mod table;
+mod writer;
+
+use crate::{
+    empty, on,
+    options::Options,
+    outputs,
+    scene::{self, Scene},
+    terminal,
+};
+use ahead::Ready;
+use frames::Selection;
+use meniscus::{
+    FrameInput,
+    host::{Gpu, Instance, Session},
+    inspect,
+};
+use plan::{Exposure, Plan, Shot};
+use std::{
+    error::Error,
+    path::PathBuf,
+    process::ExitCode,
+    sync::mpsc::{Receiver, SyncSender},
+    time::Instant,
+};
+use table::Row;
+use writer::{Message, Writer};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Particle files, one a frame: names, or patterns such as 'frames/*.vtk' in quotation marks; the scene file's `particles`
+    /// if none is given. Their order is that of the number in which their names differ
+    pub inputs: Vec<PathBuf>,
+    /// Numbered pictures, .png (sRGB, 8 bits) or .exr (linear, float), `#` for each digit: out/####.png. The numbers are the
+    /// inputs'. Given more than once, each picture is written to all of them
+    #[arg(short, long, required = true, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+    #[command(flatten)]
+    pub options: Options,
+    /// Only these numbers, such as 10-250 or 10-250:2
+    #[arg(long, value_name = "A-B[:STEP]", allow_hyphen_values = true)]
+    pub frames: Option<Selection>,
+    /// Leave out frames that cannot be read or prepared instead of ending at the first; the exit code is 1 all the same
+    #[arg(long)]
+    pub keep_going: bool,
+    /// Write a row of counts and times for each picture (.csv); rows of pictures that were there already stay
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+    /// Run with core and synchronization validation; any message is an error
+    #[arg(long)]
+    pub validate: bool,
+}
+
+/// Frames that `--keep-going` left out.
+#[derive(Debug, thiserror::Error)]
+#[error("{failed} of {all} pictures could not be made; the messages above say why")]
+struct LeftOut {
+    failed: usize,
+    all: usize,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
+    let plan = Plan::new(args)?;
+    for (last, next) in plan.frames.gaps().into_iter().take(5) {
+        terminal::complain(format!("note: no frames between {last} and {next}"));
+    }
+    let all = plan.shots.len();
+    let to_do = plan.shots.iter().filter(|s| !s.kept).count();
+    if to_do == 0 {
+        terminal::progress(format!("nothing to do: all {all} pictures are there, {}", plan.names()));
+        return Ok(ExitCode::SUCCESS);
+    }
+    let picture = &plan.shots[0].exposures[0].picture;
+    let environment = picture.environment()?;
+    let instance = Instance::new(args.validate)?;
+    let device = instance.pick(args.options.device.as_deref())?;
+    terminal::progress(format!("device: {} ({})", device.name, device.driver));
+    let there = if to_do < all { format!(", {} of which are there already", all - to_do) } else { String::new() };
+    terminal::progress(format!("pictures: {all}{there}"));
+    let on_device = on(&device);
+    let begin = Instant::now();
+    let failed = (|| {
+        let gpu = Gpu::new(&instance, device)?;
+        let mut session = Session::new(&gpu, picture.rendered_size()?, &environment)?;
+        let done = make(args, &plan, &mut session);
+        session.end();
+        done
+    })()
+    .map_err(on_device)?;
+    let messages = instance.messages();
+    for m in &messages {
+        terminal::complain(format!("validation: {m}"));
+    }
+    let made = to_do - failed;
+    let rate = made as f64 / begin.elapsed().as_secs_f64();
+    terminal::progress(format!("wrote {made} pictures, {rate:.2} a second: {}", plan.names()));
+    if failed > 0 {
+        return Err(LeftOut { failed, all }.into());
+    }
+    Ok(if messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(4) })
+}
+
+/// Makes what is not there; says how many pictures could not be made.
+fn make(args: &Args, plan: &Plan, session: &mut Session) -> Result<usize, Box<dyn Error>> {
+    scene::one_bar();
+    let bar = writer::bar(plan.shots.iter().filter(|s| !s.kept).count());
+    let writer = Writer::new(args, plan, &bar);
+    let (drawn, written) = std::thread::scope(|scope| {
+        let ready = ahead::start(scope, plan);
+        let (to_writer, messages) = std::sync::mpsc::sync_channel(1);
+        let writing = scope.spawn(move || writer.run(&messages));
+        let drawn = draw_all(args, plan, session, &ready, &to_writer, &bar);
+        // Both threads end when nobody hears them or speaks to them any more.
+        drop((ready, to_writer));
+        (drawn, writing.join())
+    });
+    bar.finish_and_clear();
+    match written {
+        // What could not be written is why nothing more was drawn.
+        Ok(written) => written.map_err(|e| -> Box<dyn Error> { e })?,
+        Err(panic) => std::panic::resume_unwind(panic),
+    }
+    drawn
+}
+
+fn draw_all(
+    args: &Args,
+    plan: &Plan,
+    session: &mut Session,
+    ready: &Receiver<Result<Ready, String>>,
+    writer: &SyncSender<Message>,
+    bar: &indicatif::ProgressBar,
+) -> Result<usize, Box<dyn Error>> {
+    let mut failed = 0;
+    for (index, shot) in plan.shots.iter().enumerate() {
+        let message = if shot.kept {
+            Message::Kept
+        } else {
+            match expose(args, shot, session, ready)? {
+                Ok((pixels, row)) => Message::Drawn { shot: index, pixels, row },
+                Err(why) if args.keep_going => {
+                    failed += 1;
+                    bar.suspend(|| terminal::complain(format!("meniscus: picture {}: {why}", shot.number)));
+                    Message::Failed
+                }
+                Err(why) => return Err(why.into()),
+            }
+        };
+        if writer.send(message).is_err() {
+            break; // it has an error of its own
+        }
+    }
+    Ok(failed)
+}
+
+/// A picture of the size rendered at, and its row; or why its frame could not be read or prepared.
+type Exposed = Result<(Vec<[f32; 3]>, Row), String>;
+
+fn expose(
+    args: &Args,
+    shot: &Shot,
+    session: &mut Session,
+    ready: &Receiver<Result<Ready, String>>,
+) -> Result<Exposed, Box<dyn Error>> {
+    let mut row = Row::new(shot);
+    for exposure in &shot.exposures {
+        let begin = Instant::now();
+        let next = ready.recv().map_err(|_| "no frame came from the thread that reads them; report this")?;
+        row.waited_ms += ms_since(begin);
+        match next {
+            Ok(ready) => draw(args, exposure, &ready, session, &mut row)?,
+            Err(why) => return Ok(Err(why)),
+        }
+    }
+    Ok(Ok((session.picture()?, row)))
+}
+
+/// Draws one moment into the session's picture.
+fn draw(
+    args: &Args,
+    exposure: &Exposure,
+    ready: &Ready,
+    session: &mut Session,
+    row: &mut Row,
+) -> Result<(), Box<dyn Error>> {
+    let (picture, scene): (_, &Scene) = (&exposure.picture, &ready.scene);
+    let begin = Instant::now();
+    let (camera, eye, _) = picture.camera(scene)?;
+    let settings = picture.frame_settings(&scene.particles)?;
+    let upload = scene.give(picture.preparer(), &settings, session)?;
+    let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
+    input.eye_inside = scene.inside(eye);
+    input.positions = upload.as_ref().map(|u| scene.on_device(u));
+    let times = session.frame(&input)?;
+    row.note = empty::explain(session, &scene.particles, &camera, &settings, picture.rendered_size()?)?;
+    row.frame_ms += ms_since(begin);
+    if args.stats.is_some() {
+        row.gpu_ms = times.map(|t| row.gpu_ms.unwrap_or(0.0) + t.span_ms);
+        let report = if picture.preparer().on_device() { inspect::report(&session.counters()?) } else { scene.report };
+        row.count(scene, &report, ready);
+    }
+    Ok(())
+}
+
+fn ms_since(begin: Instant) -> f64 {
+    begin.elapsed().as_secs_f64() * 1e3
+}
+
+/// Refuses what cannot be written, before anything is read: folders of pictures are made.
+fn check(args: &Args, pictures: &[PathBuf], inputs: &[outputs::Named]) -> Result<(), Box<dyn Error>> {
+    let mut named: Vec<outputs::Named> = Vec::new();
+    named.extend(args.stats.as_deref().map(|p| ("the statistics (--stats)", p)));
+    outputs::check(&named, None, inputs)?;
+    named.extend(inputs);
+    Ok(outputs::check_pictures(pictures, &named)?)
+}

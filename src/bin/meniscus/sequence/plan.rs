@@ -1,0 +1,140 @@
+//! What a sequence consists of: which picture is of which frame, from where and how it is seen, and whether it is there already.
+
+use super::{
+    Args, check,
+    frames::{Frames, FramesError, Pattern},
+    kept,
+};
+use crate::{outputs, picture::Picture, scene::Prepare};
+use glam::{DVec3, Vec3};
+use meniscus::io::images;
+use rayon::prelude::*;
+use std::{error::Error, path::PathBuf};
+
+/// One picture of the sequence.
+pub struct Shot {
+    pub number: u64,
+    /// What is drawn for it.
+    pub exposures: Vec<Exposure>,
+    /// Where it goes.
+    pub files: Vec<PathBuf>,
+    /// By what it is known when the sequence goes on.
+    pub label: String,
+    /// Whether it is there already.
+    pub kept: bool,
+}
+
+/// One moment of the simulation, and how it is seen.
+pub struct Exposure {
+    /// With nothing left open.
+    pub picture: Picture,
+    /// Which of the frames.
+    pub frame: usize,
+}
+
+pub struct Plan {
+    pub frames: Frames,
+    pub shots: Vec<Shot>,
+}
+
+/// What was left to the scene, as the first frame decides it, so that it is the same in all: nothing jumps, and a sequence
+/// that is made in parts is what it is in one go.
+struct Settled {
+    radius: f64,
+    eye: Option<DVec3>,
+    target: Option<DVec3>,
+    absorption: Vec3,
+}
+
+impl Settled {
+    fn of(picture: &Picture, frames: &Frames) -> Result<Option<Settled>, Box<dyn Error>> {
+        let camera = &picture.camera;
+        let given = picture.radius.is_some() && camera.eye.is_some() && camera.target.is_some();
+        if given && picture.absorption_given {
+            return Ok(None);
+        }
+        let scene = picture.load(Some(&frames.all()[0].file), picture.preparer())?;
+        let settled = picture.clone().settled(&scene)?;
+        Ok(Some(Settled {
+            radius: settled.radius.unwrap_or(f64::from(scene.particles.radius)),
+            eye: settled.camera.eye,
+            target: settled.camera.target,
+            absorption: settled.settings.liquid.absorption,
+        }))
+    }
+
+    fn complete(&self, picture: &mut Picture) {
+        picture.radius.get_or_insert(self.radius);
+        picture.camera.eye = picture.camera.eye.or(self.eye);
+        picture.camera.target = picture.camera.target.or(self.target);
+        if !picture.absorption_given {
+            picture.settings.liquid.absorption = self.absorption;
+            picture.absorption_given = true;
+        }
+    }
+}
+
+impl Plan {
+    pub fn new(args: &Args) -> Result<Plan, Box<dyn Error>> {
+        let base = args.options.base()?;
+        let inputs = match &base.particles {
+            Some(particles) if args.inputs.is_empty() => std::slice::from_ref(particles),
+            _ => &args.inputs,
+        };
+        let frames = Frames::find(inputs)?;
+        let patterns = patterns(args)?;
+        let numbers: Vec<_> = frames.all().iter().map(|f| f.number).collect();
+        let wanted = |n: &u64| args.frames.is_none_or(|s| s.has(*n));
+        let (first, last) = (numbers[0], numbers[numbers.len() - 1]);
+        let named: Vec<_> =
+            numbers.iter().filter(|n| wanted(n)).flat_map(|n| patterns.iter().map(|p| p.name(*n))).collect();
+        if let Some(selection) = args.frames.filter(|_| named.is_empty()) {
+            return Err(FramesError::Unselected { selection, first, last }.into());
+        }
+        let mut others: Vec<outputs::Named> = Vec::new();
+        others.extend(args.options.scene.as_deref().map(|p| ("the scene file (--scene)", p)));
+        others.extend(frames.all().iter().map(|f| ("a particle file", f.file.as_path())));
+
+        let mut picture = args.options.over(base, None)?;
+        picture.prepare.get_or_insert(Prepare::Cpu);
+        others.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
+        check(args, &named, &others)?;
+        picture.particles = None;
+        if let Some(settled) = Settled::of(&picture, &frames)? {
+            settled.complete(&mut picture);
+        }
+        let mut shots = Vec::new();
+        for (frame, number) in numbers.into_iter().enumerate().filter(|(_, n)| wanted(n)) {
+            let exposures = vec![Exposure { picture: picture.clone(), frame }];
+            let label = kept::label(&exposures, &frames);
+            let files = patterns.iter().map(|p| p.name(number)).collect();
+            shots.push(Shot { number, exposures, files, label, kept: false });
+        }
+        let size = picture.size;
+        shots.par_iter_mut().for_each(|s| s.kept = s.files.iter().all(|f| kept::finished(f, &s.label, size)));
+        Ok(Plan { frames, shots })
+    }
+
+    /// The first picture's name, and the last one's.
+    pub fn names(&self) -> String {
+        let name = |shot: Option<&Shot>| shot.and_then(|s| s.files.first()).map(|f| f.display().to_string());
+        let [first, last] = [self.shots.first(), self.shots.last()].map(|s| name(s).unwrap_or_default());
+        if first == last { first } else { format!("{first} to {last}") }
+    }
+}
+
+/// What pictures are called; their folders are there.
+fn patterns(args: &Args) -> Result<Vec<Pattern>, Box<dyn Error>> {
+    let mut patterns = Vec::new();
+    for path in &args.output {
+        images::check_extension(path)?;
+        let pattern = Pattern::new(path)?;
+        if patterns.contains(&pattern) {
+            let [option, other] = ["one output (--output)", "another"];
+            return Err(outputs::OutputError::Clash { path: path.clone(), option, other }.into());
+        }
+        outputs::folder(pattern.folder())?;
+        patterns.push(pattern);
+    }
+    Ok(patterns)
+}

@@ -1,0 +1,128 @@
+//! `--stats`: a row for each picture.
+
+use super::{
+    ahead::Ready,
+    plan::{Plan, Shot},
+};
+use crate::{
+    outputs::{self, OutputError},
+    scene::Scene,
+};
+use meniscus::prepare::Report;
+use std::{
+    collections::BTreeMap,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+/// What is known of one picture. Of several exposures times are summed, counts are the last one's.
+#[derive(Default)]
+pub struct Row {
+    number: u64,
+    particles: usize,
+    splash: usize,
+    body: usize,
+    dropped: usize,
+    read_ms: f64,
+    prepare_ms: f64,
+    /// How long the device waited for the frame to be read and prepared.
+    pub waited_ms: f64,
+    pub frame_ms: f64,
+    pub gpu_ms: Option<f64>,
+    pub encode_ms: f64,
+    /// Mean difference from the last picture's colours, of 1.
+    pub change: Option<f64>,
+    /// Why it shows no liquid, if it shows none.
+    pub note: Option<String>,
+}
+
+const HEADER: [&str; 12] = [
+    "number",
+    "file",
+    "particles",
+    "splash",
+    "body",
+    "dropped",
+    "read_ms",
+    "prepare_ms",
+    "waited_ms",
+    "frame_ms",
+    "gpu_ms",
+    "encode_ms",
+];
+const CHANGE: &str = "change";
+
+impl Row {
+    pub fn new(shot: &Shot) -> Row {
+        Row { number: shot.number, ..Row::default() }
+    }
+
+    pub fn count(&mut self, scene: &Scene, report: &Report, ready: &Ready) {
+        self.particles = scene.positions.len();
+        (self.splash, self.body, self.dropped) = (report.splash, report.body, scene.dropped);
+        self.read_ms += ready.read_ms;
+        self.prepare_ms += ready.prepare_ms;
+    }
+
+    fn cells(&self, file: String) -> Vec<String> {
+        let ms = |v: f64| format!("{v:.2}");
+        let counts = [self.particles, self.splash, self.body, self.dropped].map(|n| n.to_string());
+        let times = [self.read_ms, self.prepare_ms, self.waited_ms, self.frame_ms].map(ms);
+        let mut cells = vec![self.number.to_string(), file];
+        cells.extend(counts.into_iter().chain(times));
+        cells.extend([self.gpu_ms.map_or(String::new(), ms), ms(self.encode_ms)]);
+        cells.push(self.change.map_or(String::new(), |c| format!("{c:.6}")));
+        cells
+    }
+}
+
+/// All rows, by number; those of pictures that were there already are an older table's.
+pub struct Table<'a> {
+    path: &'a Path,
+    plan: &'a Plan,
+    rows: BTreeMap<u64, Vec<String>>,
+    /// When it is to be written again: as rarely as that takes long.
+    due: Instant,
+}
+
+impl<'a> Table<'a> {
+    pub fn new(path: &'a Path, plan: &'a Plan) -> Table<'a> {
+        let mut rows = older(path).unwrap_or_default();
+        rows.retain(|number, _| plan.shots.iter().any(|s| s.kept && s.number == *number));
+        Table { path, plan, rows, due: Instant::now() }
+    }
+
+    pub fn add(&mut self, row: Row) -> Result<(), OutputError> {
+        let shot = self.plan.shots.iter().find(|s| s.number == row.number);
+        let file = shot.map(|s| self.plan.frames.all()[s.exposures[0].frame].file.display().to_string());
+        self.rows.insert(row.number, row.cells(file.unwrap_or_default()));
+        let begin = Instant::now();
+        if begin < self.due {
+            return Ok(());
+        }
+        self.write()?;
+        self.due = Instant::now() + 20 * begin.elapsed().saturating_sub(Duration::from_millis(2));
+        Ok(())
+    }
+
+    pub fn write(&mut self) -> Result<(), OutputError> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let header: Vec<_> = HEADER.iter().chain([&CHANGE]).map(|h| (*h).to_owned()).collect();
+        // Into memory, rows of one length: nothing can fail.
+        for row in [&header].into_iter().chain(self.rows.values()) {
+            writer.write_record(row).expect("rows of one length");
+        }
+        outputs::write(self.path, &writer.into_inner().expect("written to memory"))
+    }
+}
+
+/// The rows of a table that was written before; nothing if it is none.
+fn older(path: &Path) -> Option<BTreeMap<u64, Vec<String>>> {
+    let mut reader = csv::Reader::from_path(path).ok().filter(|_| path.is_file())?;
+    let header = reader.headers().ok()?.clone();
+    if header.iter().ne(HEADER.into_iter().chain([CHANGE])) {
+        return None;
+    }
+    let row = |r: csv::StringRecord| Some((r.get(0)?.parse().ok()?, r.iter().map(str::to_owned).collect()));
+    reader.into_records().map_while(Result::ok).map(row).collect()
+}
