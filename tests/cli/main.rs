@@ -2,6 +2,7 @@
 
 mod bench;
 mod drivers;
+mod films;
 mod outputs;
 mod pipelines;
 mod profiling;

@@ -176,6 +176,35 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     }
 }
 
+/// A file that is written bit by bit: it has its name when it is whole, but for devices and pipes.
+pub struct Growing<'a> {
+    /// As it was named.
+    name: &'a Path,
+    made: Option<(temporary::Growing, PathBuf)>,
+}
+
+impl<'a> Growing<'a> {
+    pub fn new(name: &'a Path) -> Result<(Growing<'a>, fs::File), OutputError> {
+        if special(name) {
+            let file = fs::OpenOptions::new().append(true).open(name).map_err(failed(name))?;
+            return Ok((Growing { name, made: None }, file));
+        }
+        let place = resolve(name)?;
+        let (made, file) = temporary::Growing::new(place.parent().unwrap_or(&place)).map_err(failed(name))?;
+        Ok((Growing { name, made: Some((made, place)) }, file))
+    }
+
+    /// What went wrong in writing it, with its name.
+    pub fn failed(&self, source: io::Error) -> OutputError {
+        failed(self.name)(source)
+    }
+
+    pub fn finish(self) -> Result<(), OutputError> {
+        let Some((made, place)) = self.made else { return Ok(()) };
+        made.finish(&place).map_err(failed(self.name))
+    }
+}
+
 /// Makes a folder, if it is not there, that several files are written into one after the other, and checks that they can be.
 pub fn folder(path: &Path) -> Result<(), OutputError> {
     fs::create_dir_all(path).and_then(|()| temporary::try_out(&fs::canonicalize(path)?)).map_err(failed(path))

@@ -1,9 +1,10 @@
-//! `meniscus sequence`: the frames of a simulation to numbered pictures, of which a finished one is not made again.
+//! `meniscus sequence`: the frames of a simulation to numbered pictures, of which a finished one is not made again, and films.
 //!
 //! Three threads: one reads and prepares the next frame, this one has the device draw, one encodes and writes. Each holds one
 //! frame, whatever their number.
 
 mod ahead;
+mod film;
 mod frames;
 mod kept;
 mod plan;
@@ -18,6 +19,7 @@ use crate::{
     terminal,
 };
 use ahead::Ready;
+use film::Kind;
 use frames::Selection;
 use meniscus::{
     FrameInput,
@@ -41,7 +43,8 @@ pub struct Args {
     /// if none is given. Their order is that of the number in which their names differ
     pub inputs: Vec<PathBuf>,
     /// Numbered pictures, .png (sRGB, 8 bits) or .exr (linear, float), `#` for each digit: out/####.png. The numbers are the
-    /// inputs'. Given more than once, each picture is written to all of them
+    /// inputs'. Or a film: .mp4, .mkv or .webm (by ffmpeg, which has to be installed), .gif, or .png without `#` (animated). May be
+    /// given more than once: a film is made anew each time, but of pictures beside it only those that are not there
     #[arg(short, long, required = true, value_name = "FILE")]
     pub output: Vec<PathBuf>,
     #[command(flatten)]
@@ -49,7 +52,11 @@ pub struct Args {
     /// Only these numbers, such as 10-250 or 10-250:2
     #[arg(long, value_name = "A-B[:STEP]", allow_hyphen_values = true)]
     pub frames: Option<Selection>,
-    /// Leave out frames that cannot be read or prepared instead of ending at the first; the exit code is 1 all the same
+    /// Pictures a second, of films
+    #[arg(long, value_name = "RATE", default_value_t = 25.0, value_parser = rate)]
+    pub fps: f64,
+    /// Leave out frames that cannot be read or prepared instead of ending at the first (a film shows the one before them); the
+    /// exit code is 1 all the same
     #[arg(long)]
     pub keep_going: bool,
     /// Write a row of counts and times for each picture (.csv); rows of pictures that were there already stay
@@ -76,7 +83,12 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let all = plan.shots.len();
     let to_do = plan.shots.iter().filter(|s| !s.kept).count();
     if to_do == 0 {
-        terminal::progress(format!("nothing to do: all {all} pictures are there, {}", plan.names()));
+        if plan.films.is_empty() {
+            terminal::progress(format!("nothing to do: all {all} pictures are there, {}", plan.names()));
+        } else {
+            make(args, &plan, None)?;
+            terminal::progress(format!("all {all} pictures are there; wrote {}", plan.names()));
+        }
         return Ok(ExitCode::SUCCESS);
     }
     let picture = &plan.shots[0].exposures[0].picture;
@@ -91,7 +103,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let failed = (|| {
         let gpu = Gpu::new(&instance, device)?;
         let mut session = Session::new(&gpu, picture.rendered_size()?, &environment)?;
-        let done = make(args, &plan, &mut session);
+        let done = make(args, &plan, Some(&mut session));
         session.end();
         done
     })()
@@ -110,10 +122,10 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
 }
 
 /// Makes what is not there; says how many pictures could not be made.
-fn make(args: &Args, plan: &Plan, session: &mut Session) -> Result<usize, Box<dyn Error>> {
+fn make(args: &Args, plan: &Plan, session: Option<&mut Session>) -> Result<usize, Box<dyn Error>> {
     scene::one_bar();
     let bar = writer::bar(plan.shots.iter().filter(|s| !s.kept).count());
-    let writer = Writer::new(args, plan, &bar);
+    let writer = Writer::new(args, plan, &bar).map_err(|e| -> Box<dyn Error> { e })?;
     let (drawn, written) = std::thread::scope(|scope| {
         let ready = ahead::start(scope, plan);
         let (to_writer, messages) = std::sync::mpsc::sync_channel(1);
@@ -135,30 +147,32 @@ fn make(args: &Args, plan: &Plan, session: &mut Session) -> Result<usize, Box<dy
 fn draw_all(
     args: &Args,
     plan: &Plan,
-    session: &mut Session,
+    mut session: Option<&mut Session>,
     ready: &Receiver<Result<Ready, String>>,
     writer: &SyncSender<Message>,
     bar: &indicatif::ProgressBar,
 ) -> Result<usize, Box<dyn Error>> {
     let mut failed = 0;
     for (index, shot) in plan.shots.iter().enumerate() {
-        let message = if shot.kept {
-            Message::Kept
-        } else {
-            match expose(args, shot, session, ready)? {
+        let message = match session.as_deref_mut().filter(|_| !shot.kept) {
+            None => Message::Kept { shot: index },
+            Some(session) => match expose(args, shot, session, ready)? {
                 Ok((pixels, row)) => Message::Drawn { shot: index, pixels, row },
                 Err(why) if args.keep_going => {
                     failed += 1;
                     bar.suspend(|| terminal::complain(format!("meniscus: picture {}: {why}", shot.number)));
                     Message::Failed
                 }
+                // What was drawn before is written; a film of less than all is not.
                 Err(why) => return Err(why.into()),
-            }
+            },
         };
         if writer.send(message).is_err() {
-            break; // it has an error of its own
+            return Ok(failed); // it has an error of its own
         }
     }
+    // The same holds here.
+    let _ = writer.send(Message::Complete);
     Ok(failed)
 }
 
@@ -211,6 +225,11 @@ fn draw(
     Ok(())
 }
 
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|r| (0.1..=100.0).contains(r));
+    rate.ok_or_else(|| format!("\"{}\" is not a number of pictures a second: use 0.1 to 100", terminal::plain(text)))
+}
+
 fn ms_since(begin: Instant) -> f64 {
     begin.elapsed().as_secs_f64() * 1e3
 }
@@ -219,6 +238,7 @@ fn ms_since(begin: Instant) -> f64 {
 fn check(args: &Args, pictures: &[PathBuf], inputs: &[outputs::Named]) -> Result<(), Box<dyn Error>> {
     let mut named: Vec<outputs::Named> = Vec::new();
     named.extend(args.stats.as_deref().map(|p| ("the statistics (--stats)", p)));
+    named.extend(args.output.iter().filter(|p| Kind::of(p).is_some()).map(|p| ("a film (--output)", p.as_path())));
     outputs::check(&named, None, inputs)?;
     named.extend(inputs);
     Ok(outputs::check_pictures(pictures, &named)?)

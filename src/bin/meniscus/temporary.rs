@@ -121,6 +121,20 @@ pub fn try_out(folder: &Path) -> io::Result<()> {
     Temporary::file(folder).map(|_| ())
 }
 
+/// A file that is written bit by bit, and has its name when it is whole.
+pub struct Growing(Temporary);
+
+impl Growing {
+    pub fn new(parent: &Path) -> io::Result<(Growing, File)> {
+        Temporary::file(parent).map(|(temporary, file)| (Growing(temporary), file))
+    }
+
+    /// Gives it its name; `path` has no links in it.
+    pub fn finish(self, path: &Path) -> io::Result<()> {
+        self.0.rename(path)
+    }
+}
+
 /// A folder that is whole as soon as it is there.
 pub struct Folder {
     path: PathBuf,

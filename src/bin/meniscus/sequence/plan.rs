@@ -2,6 +2,7 @@
 
 use super::{
     Args, check,
+    film::Kind,
     frames::{Frames, FramesError, Pattern},
     kept,
 };
@@ -35,6 +36,8 @@ pub struct Exposure {
 pub struct Plan {
     pub frames: Frames,
     pub shots: Vec<Shot>,
+    /// Made anew, of all pictures.
+    pub films: Vec<(PathBuf, Kind)>,
 }
 
 /// What was left to the scene, as the first frame decides it, so that it is the same in all: nothing jumps, and a sequence
@@ -88,7 +91,7 @@ impl Plan {
         let (first, last) = (numbers[0], numbers[numbers.len() - 1]);
         let named: Vec<_> =
             numbers.iter().filter(|n| wanted(n)).flat_map(|n| patterns.iter().map(|p| p.name(*n))).collect();
-        if let Some(selection) = args.frames.filter(|_| named.is_empty()) {
+        if let Some(selection) = args.frames.filter(|_| !numbers.iter().any(wanted)) {
             return Err(FramesError::Unselected { selection, first, last }.into());
         }
         let mut others: Vec<outputs::Named> = Vec::new();
@@ -111,23 +114,29 @@ impl Plan {
             shots.push(Shot { number, exposures, files, label, kept: false });
         }
         let size = picture.size;
-        shots.par_iter_mut().for_each(|s| s.kept = s.files.iter().all(|f| kept::finished(f, &s.label, size)));
-        Ok(Plan { frames, shots })
+        let finished = |s: &Shot| !s.files.is_empty() && s.files.iter().all(|f| kept::finished(f, &s.label, size));
+        shots.par_iter_mut().for_each(|s| s.kept = finished(s));
+        let films = args.output.iter().filter_map(|p| Some((p.clone(), Kind::of(p)?))).collect();
+        Ok(Plan { frames, shots, films })
     }
 
-    /// The first picture's name, and the last one's.
+    /// The first picture's name, and the last one's; and films.
     pub fn names(&self) -> String {
         let name = |shot: Option<&Shot>| shot.and_then(|s| s.files.first()).map(|f| f.display().to_string());
-        let [first, last] = [self.shots.first(), self.shots.last()].map(|s| name(s).unwrap_or_default());
-        if first == last { first } else { format!("{first} to {last}") }
+        let mut names = Vec::new();
+        if let (Some(first), Some(last)) = (name(self.shots.first()), name(self.shots.last())) {
+            names.push(if first == last { first } else { format!("{first} to {last}") });
+        }
+        names.extend(self.films.iter().map(|f| f.0.display().to_string()));
+        names.join(", ")
     }
 }
 
 /// What pictures are called; their folders are there.
 fn patterns(args: &Args) -> Result<Vec<Pattern>, Box<dyn Error>> {
     let mut patterns = Vec::new();
-    for path in &args.output {
-        images::check_extension(path)?;
+    for path in args.output.iter().filter(|p| Kind::of(p).is_none()) {
+        images::check_extension(path).map_err(|e| format!("{e}; or a film: .mp4, .mkv, .webm, .gif"))?;
         let pattern = Pattern::new(path)?;
         if patterns.contains(&pattern) {
             let [option, other] = ["one output (--output)", "another"];

@@ -1,7 +1,9 @@
 //! The thread that encodes and writes pictures while the next one is drawn.
 
 use super::{
-    Args, ms_since,
+    Args,
+    film::{Film, Format},
+    ms_since,
     plan::Plan,
     table::{Row, Table},
 };
@@ -19,9 +21,11 @@ pub enum Message {
         row: Row,
     },
     /// It is there already.
-    Kept,
+    Kept { shot: usize },
     /// Its frame could not be had.
     Failed,
+    /// That were all of them.
+    Complete,
 }
 
 /// Errors that a thread may hand over.
@@ -33,6 +37,9 @@ pub struct Writer<'a> {
     table: Option<Table<'a>>,
     /// The last picture's sRGB bytes, for what has changed since.
     last: Option<Vec<[u8; 3]>>,
+    films: Vec<Film<'a>>,
+    /// Pictures that could not be had before the first of a film.
+    owed: usize,
 }
 
 /// A bar for pictures that are to be made, with the time that is left.
@@ -45,24 +52,59 @@ pub fn bar(length: usize) -> ProgressBar {
 }
 
 impl<'a> Writer<'a> {
-    pub fn new(args: &'a Args, plan: &'a Plan, bar: &'a ProgressBar) -> Self {
+    pub fn new(args: &'a Args, plan: &'a Plan, bar: &'a ProgressBar) -> Result<Self, Failure> {
         let table = args.stats.as_deref().map(|path| Table::new(path, plan));
-        Writer { plan, bar, table, last: None }
+        let size = plan.shots[0].exposures[0].picture.size;
+        let format = Format { size, rate: args.fps, frames: plan.shots.len() };
+        let films = plan.films.iter().map(|(path, kind)| Film::new(path, *kind, format)).collect::<Result<_, _>>()?;
+        Ok(Writer { plan, bar, table, last: None, films, owed: 0 })
     }
 
     /// Writes pictures until no more come.
     pub fn run(mut self, messages: &Receiver<Message>) -> Result<(), Failure> {
+        let mut whole = false;
         for message in messages {
             match message {
                 Message::Drawn { shot, pixels, row } => self.write(shot, &pixels, row)?,
-                Message::Kept => self.last = None,
+                Message::Kept { shot } => self.keep(shot)?,
                 Message::Failed => {
-                    self.last = None;
                     self.bar.inc(1);
+                    match self.last.clone() {
+                        Some(last) => self.film(&last)?,
+                        None => self.owed += 1,
+                    }
                 }
+                Message::Complete => whole = true,
             }
         }
         self.table.as_mut().map_or(Ok(()), Table::write)?;
+        for film in self.films.drain(..).filter(|_| whole) {
+            film.finish()?;
+        }
+        Ok(())
+    }
+
+    /// Adds a picture to the films.
+    fn film(&mut self, bytes: &[[u8; 3]]) -> Result<(), Failure> {
+        for _ in 0..=std::mem::take(&mut self.owed) {
+            self.films.iter_mut().try_for_each(|film| film.add(bytes))?;
+        }
+        Ok(())
+    }
+
+    /// One that is there: needed by what compares it with the next, and by films.
+    fn keep(&mut self, index: usize) -> Result<(), Failure> {
+        let next = self.plan.shots.get(index + 1);
+        let compared = self.table.is_some() && next.is_some_and(|next| !next.kept);
+        self.last = None;
+        if compared || !self.films.is_empty() {
+            let shot = &self.plan.shots[index];
+            let picture = &shot.exposures[0].picture;
+            let file = shot.files.first().ok_or("a picture that is there has no name; report this")?;
+            let bytes = srgb_bytes(&read_picture(file, &picture.max_memory)?.1);
+            self.film(&bytes)?;
+            self.last = Some(bytes);
+        }
         Ok(())
     }
 
@@ -77,21 +119,17 @@ impl<'a> Writer<'a> {
         if let Some(why) = row.note.take() {
             self.bar.suspend(|| terminal::complain(format!("meniscus: picture {}: {why}", shot.number)));
         }
+        let bytes = srgb_bytes(&pixels);
         if let Some(table) = &mut self.table {
-            let bytes = srgb_bytes(&pixels);
-            let before = index.checked_sub(1).map(|i| &self.plan.shots[i]);
-            let last = self
-                .last
-                .take()
-                .or_else(|| read_picture(before?.files.first()?, &picture.max_memory).ok().map(|p| srgb_bytes(&p.1)));
-            row.change = last.and_then(|last| change(&last, &bytes));
-            self.last = Some(bytes);
+            row.change = self.last.as_ref().and_then(|last| change(last, &bytes));
             // Before the picture: one that is there has its row.
             table.add(row)?;
         }
         for (file, bytes) in shot.files.iter().zip(encoded?) {
             outputs::write(file, &bytes)?;
         }
+        self.film(&bytes)?;
+        self.last = Some(bytes);
         self.bar.inc(1);
         Ok(())
     }
