@@ -6,7 +6,9 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 packages=(build-essential binutils libvulkan1 mesa-vulkan-drivers vulkan-validationlayers
-          libshaderc-dev glslang-dev spirv-tools)
+          libshaderc-dev glslang-dev spirv-tools
+          # For the C interface's tests: Vulkan's headers, and what finds an installed library.
+          libvulkan-dev pkg-config cmake)
 # SwiftShader, a second Vulkan driver, comes with Debian's Chromium; Ubuntu ships that as a snap, without it.
 optional=(chromium-common)
 

@@ -4,7 +4,7 @@
 //! and writes the last picture as a PPM.
 //!
 //! ```sh
-//! cargo run --example embed -- water.ppm
+//! cargo run --example embed -- water.ppm [part of a driver's name]
 //! ```
 
 use ash::vk;
@@ -80,6 +80,7 @@ fn positions() -> Vec<Vec3> {
 
 fn main() -> Result<()> {
     let file = std::env::args().nth(1).unwrap_or_else(|| "water.ppm".into());
+    let driver = std::env::args().nth(2).unwrap_or_default();
     // SAFETY: the loader stays loaded, and every handle below is destroyed once, children first, with the device idle.
     unsafe {
         // The engine's own Vulkan: any 1.3 device that will do, with what meniscus asks for enabled.
@@ -88,7 +89,10 @@ fn main() -> Result<()> {
         let instance = entry.create_instance(&vk::InstanceCreateInfo::default().application_info(&app), None)?;
         let family = 0;
         let physical = instance.enumerate_physical_devices()?;
-        let physical = physical.into_iter().find(|d| device::check(&instance, *d, family).is_ok());
+        let wanted = |d: &vk::PhysicalDevice| {
+            device::check(&instance, *d, family).is_ok() && driver_name(&instance, *d).contains(&driver)
+        };
+        let physical = physical.into_iter().find(wanted);
         let physical = physical.ok_or("no Vulkan device that meniscus can use")?;
         let large_points = instance.get_physical_device_features(physical).large_points != 0;
         let features = vk::PhysicalDeviceFeatures::default().large_points(large_points);
@@ -185,6 +189,18 @@ fn main() -> Result<()> {
         instance.destroy_instance(None);
     }
     Ok(())
+}
+
+/// # Safety
+/// The physical device is the instance's, and of Vulkan 1.2 at least.
+unsafe fn driver_name(instance: &ash::Instance, physical: vk::PhysicalDevice) -> String {
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+    // SAFETY: this function's contract; the chain lives on this stack frame.
+    unsafe { instance.get_physical_device_properties2(physical, &mut properties) };
+    let [name, version] = [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()]
+        .map(|s| s.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default());
+    format!("{name} {version}")
 }
 
 const UNDEFINED: vk::ImageLayout = vk::ImageLayout::UNDEFINED;

@@ -1,0 +1,237 @@
+//! What the host gives for one frame.
+
+use crate::{
+    camera::MeniscusCamera,
+    settings::MeniscusSettings,
+    status::Failure,
+    versioned::{Versioned, borrow, read, read_some},
+};
+use renderer::{
+    Background, Camera, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput, Settings,
+    ash::vk::{
+        Bool32 as VkBool32, Buffer as VkBuffer, DeviceSize as VkDeviceSize, ImageLayout as VkImageLayout,
+        ImageView as VkImageView,
+    },
+    prepare::{DeviceIds, DevicePositions, Options},
+};
+use std::mem::offset_of;
+
+/// MeniscusFrame::background: the environment, and before it the scene. Every pixel of the output is written, with alpha 1.
+pub const MENISCUS_BACKGROUND_ENVIRONMENT: u32 = 0;
+/// MeniscusFrame::background: the host's own picture, which the output holds. Only pixels that show liquid are written, with
+/// alpha 1. Rays that meet nothing take the scene's colour where its depth is cleared in the direction they go.
+pub const MENISCUS_BACKGROUND_HOST: u32 = 1;
+
+/// MeniscusEnvironment::shape: a 2D view, equirectangular: the first row is straight up, columns run once around.
+pub const MENISCUS_ENVIRONMENT_EQUIRECT: u32 = 0;
+/// MeniscusEnvironment::shape: a cube view.
+pub const MENISCUS_ENVIRONMENT_CUBE: u32 = 1;
+
+/// Positions in device memory, prepared within the frame that draws them: neighbours, classes, shapes, with no word about them to
+/// the host. How says the frame's settings (support, splash_threshold and so on).
+///
+/// The buffers have usage STORAGE_BUFFER, and their writes are visible to reads in compute shaders before the frame, which only
+/// reads them.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct MeniscusPositions {
+    /// sizeof(MeniscusPositions).
+    pub struct_size: usize,
+    /// Three 32-bit floats a particle, in world units. A position that is not finite is left out.
+    pub buffer: VkBuffer,
+    /// Where the first one begins, in bytes; a multiple of 4.
+    pub offset: VkDeviceSize,
+    /// Bytes from one to the next; a multiple of 4, at least 12. 0 stands for 12.
+    pub stride: VkDeviceSize,
+    /// How many there are.
+    pub count: u32,
+    /// Particle radius in world units: half the rest spacing.
+    pub radius: f32,
+    /// Hysteresis against popping: a particle keeps the class that the last frame gave it while its density lies between the
+    /// setting splash_threshold and this share of a filled body's; a tenth above the threshold is plenty. 0 stands for none.
+    pub keep_class_below: f32,
+    /// How many ids there may be: all are below this. 0 stands for no ids: then particles go by their place in the buffer.
+    pub id_number: u32,
+    /// One id of 32 bits a particle, for keep_class_below: needed where the simulation re-sorts its particles, or their number
+    /// changes. It may be the buffer of the positions.
+    pub id_buffer: VkBuffer,
+    /// Where the first id begins, in bytes; a multiple of 4.
+    pub id_offset: VkDeviceSize,
+    /// Bytes from one id to the next; a multiple of 4. 0 stands for 4.
+    pub id_stride: VkDeviceSize,
+}
+
+// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers and handles.
+unsafe impl Versioned for MeniscusPositions {
+    const NAME: &'static str = "MeniscusPositions";
+    const LEAST: usize = offset_of!(MeniscusPositions, keep_class_below);
+}
+
+impl MeniscusPositions {
+    /// What the renderer takes.
+    pub(crate) fn get(&self, options: &Options) -> DevicePositions {
+        let or = |given, usual| if given == 0 { usual } else { given };
+        let ids = DeviceIds::packed(self.id_buffer, self.id_number).laid_out(self.id_offset, or(self.id_stride, 4));
+        DevicePositions::packed(self.buffer, self.count, self.radius)
+            .laid_out(self.offset, or(self.stride, 12))
+            .options(*options)
+            .keep_class_below((self.keep_class_below != 0.0).then_some(self.keep_class_below))
+            .ids((self.id_number > 0).then_some(ids))
+    }
+}
+
+/// The host's opaque scene, rendered before the liquid at the same size and with the same camera. It hides liquid, is seen through
+/// it, and ends rays under water. Both images are sampled in the fragment stage.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct MeniscusScene {
+    /// sizeof(MeniscusScene).
+    pub struct_size: usize,
+    /// Linear colour.
+    pub color: VkImageView,
+    /// Depth buffer (depth aspect) of the camera's projection.
+    pub depth: VkImageView,
+    /// Layout the colour is in, before and after.
+    pub color_layout: VkImageLayout,
+    /// Layout the depth is in, before and after.
+    pub depth_layout: VkImageLayout,
+    /// Depth value where nothing was drawn: 1, or 0 with reversed depths.
+    pub cleared_depth: f32,
+    /// 0.
+    pub reserved: u32,
+}
+
+// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers and handles.
+unsafe impl Versioned for MeniscusScene {
+    const NAME: &'static str = "MeniscusScene";
+    const LEAST: usize = offset_of!(MeniscusScene, reserved);
+}
+
+/// An environment of the host's own, in place of the one that the renderer was given: linear light, infinitely far away, sampled in
+/// the fragment stage.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct MeniscusEnvironment {
+    /// sizeof(MeniscusEnvironment).
+    pub struct_size: usize,
+    /// Of any format that reads as floats; mip level 0 is used.
+    pub view: VkImageView,
+    /// Layout it is in, before and after.
+    pub layout: VkImageLayout,
+    /// MENISCUS_ENVIRONMENT_...
+    pub shape: u32,
+}
+
+// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers and handles.
+unsafe impl Versioned for MeniscusEnvironment {
+    const NAME: &'static str = "MeniscusEnvironment";
+    const LEAST: usize = offset_of!(MeniscusEnvironment, shape);
+}
+
+/// One frame. Pointers are read before the call returns.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct MeniscusFrame {
+    /// sizeof(MeniscusFrame).
+    pub struct_size: usize,
+    /// Camera.
+    pub camera: *const MeniscusCamera,
+    /// Method, liquid, drawing; and how positions on the device are prepared.
+    pub settings: *const MeniscusSettings,
+    /// Of the format and size that the renderer was given, in COLOR_ATTACHMENT_OPTIMAL before and after.
+    pub output: VkImageView,
+    /// Which of the frames in flight this is: below MeniscusHost::frames_in_flight.
+    pub slot: u32,
+    /// MENISCUS_BACKGROUND_...
+    pub background: u32,
+    /// Positions on the device, drawn instead of the particles last given; or null.
+    pub positions: *const MeniscusPositions,
+    /// The host's opaque scene; or null.
+    pub scene: *const MeniscusScene,
+    /// The host's own environment; or null for the one that the renderer was given.
+    pub environment: *const MeniscusEnvironment,
+    /// VK_TRUE if the particles are those of the frame recorded before and have not moved since: then what follows from them alone is
+    /// kept.
+    pub still: VkBool32,
+    /// VK_TRUE if the eye is inside the body (meniscus_density_at): every ray then starts in it. A density field knows by itself.
+    pub eye_inside: VkBool32,
+}
+
+// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers, handles and pointers that may be null.
+unsafe impl Versioned for MeniscusFrame {
+    const NAME: &'static str = "MeniscusFrame";
+    const LEAST: usize = offset_of!(MeniscusFrame, background);
+}
+
+/// A frame as it was read.
+pub(crate) struct Read {
+    slot: usize,
+    camera: Camera,
+    settings: Settings,
+    positions: Option<DevicePositions>,
+    scene: Option<SceneInput>,
+    environment: Option<EnvironmentInput>,
+    background: Background,
+    output: VkImageView,
+    still: bool,
+    eye_inside: bool,
+}
+
+impl Read {
+    /// # Safety
+    /// As [`read`], for the frame and what it points to; the settings are ours.
+    pub unsafe fn new(frame: *const MeniscusFrame) -> Result<Read, Failure> {
+        // SAFETY: this function's contract.
+        let (f, camera, settings, positions, scene, environment) = unsafe {
+            let f = read(frame)?;
+            let settings = borrow(f.settings, "MeniscusFrame::settings")?;
+            let camera = MeniscusCamera::get(f.camera)?;
+            (f, camera, settings, read_some(f.positions)?, read_some(f.scene)?, read_some(f.environment)?)
+        };
+        let background = match f.background {
+            MENISCUS_BACKGROUND_ENVIRONMENT => Background::Environment,
+            MENISCUS_BACKGROUND_HOST => Background::Host,
+            other => return Err(unknown("MeniscusFrame::background", other, "MENISCUS_BACKGROUND_")),
+        };
+        let environment = match environment {
+            None => None,
+            Some(e) => {
+                let shape = match e.shape {
+                    MENISCUS_ENVIRONMENT_EQUIRECT => EnvironmentShape::Equirect,
+                    MENISCUS_ENVIRONMENT_CUBE => EnvironmentShape::Cube,
+                    other => return Err(unknown("MeniscusEnvironment::shape", other, "MENISCUS_ENVIRONMENT_")),
+                };
+                Some(EnvironmentInput::new(e.view, e.layout, shape))
+            }
+        };
+        Ok(Read {
+            slot: f.slot as usize,
+            camera,
+            settings: settings.settings,
+            positions: positions.map(|p: MeniscusPositions| p.get(&settings.options)),
+            scene: scene.map(|s: MeniscusScene| {
+                SceneInput::new((s.color, s.color_layout), (s.depth, s.depth_layout), s.cleared_depth)
+            }),
+            environment,
+            background,
+            output: f.output,
+            still: f.still != 0,
+            eye_inside: f.eye_inside != 0,
+        })
+    }
+
+    /// What the renderer takes.
+    pub fn input(&self) -> FrameInput<'_> {
+        FrameInput::new(self.slot, &self.camera, &self.settings, self.output)
+            .positions(self.positions)
+            .scene(self.scene)
+            .environment(self.environment)
+            .background(self.background)
+            .still(self.still)
+            .eye_inside(self.eye_inside)
+    }
+}
+
+fn unknown(what: &str, value: u32, names: &str) -> Failure {
+    Failure::parameter(format!("{what} is {value}: use one of {names}..."))
+}
