@@ -37,6 +37,13 @@ static void check(MeniscusStatus status) {
     }
 }
 
+static VkFence make_fence(const Vulkan *vk) {
+    const VkFenceCreateInfo info = {.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, .flags = VK_FENCE_CREATE_SIGNALED_BIT};
+    VkFence fence;
+    VK(vkCreateFence(vk->device, &info, NULL, &fence));
+    return fence;
+}
+
 /* A ball of liquid, and a droplet beside it. */
 static size_t liquid(float (*at)[3]) {
     size_t count = 0;
@@ -226,7 +233,7 @@ int main(int argc, char **argv) {
         slots[i].scene = make_image(&vk, SCENE, VK_IMAGE_ASPECT_COLOR_BIT, attachment | sampled | copied);
         slots[i].depth =
             make_image(&vk, DEPTH, VK_IMAGE_ASPECT_DEPTH_BIT, VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT | sampled);
-        slots[i].readback = make_buffer(&vk, 4 * WIDTH * HEIGHT);
+        slots[i].readback = make_buffer(&vk, 4 * WIDTH * HEIGHT, VK_BUFFER_USAGE_TRANSFER_DST_BIT);
     }
 
     /* meniscus borrows all that. An sRGB output receives linear colour, and encodes it. */

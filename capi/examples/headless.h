@@ -137,13 +137,6 @@ static VkCommandBuffer make_commands(const Vulkan *vk) {
     return cmd;
 }
 
-static VkFence make_fence(const Vulkan *vk) {
-    const VkFenceCreateInfo info = {.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, .flags = VK_FENCE_CREATE_SIGNALED_BIT};
-    VkFence fence;
-    VK(vkCreateFence(vk->device, &info, NULL, &fence));
-    return fence;
-}
-
 static VkDeviceMemory allocate(const Vulkan *vk, VkMemoryRequirements needed, VkMemoryPropertyFlags wanted) {
     VkPhysicalDeviceMemoryProperties properties;
     vkGetPhysicalDeviceMemoryProperties(vk->physical, &properties);
@@ -184,10 +177,10 @@ static Image make_image(const Vulkan *vk, VkFormat format, VkImageAspectFlags as
     return made;
 }
 
-static Buffer make_buffer(const Vulkan *vk, VkDeviceSize size) {
+static Buffer make_buffer(const Vulkan *vk, VkDeviceSize size, VkBufferUsageFlags usage) {
     Buffer made;
     const VkBufferCreateInfo info = {
-        .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, .size = size, .usage = VK_BUFFER_USAGE_TRANSFER_DST_BIT};
+        .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, .size = size, .usage = usage};
     VK(vkCreateBuffer(vk->device, &info, NULL, &made.buffer));
     VkMemoryRequirements needed;
     vkGetBufferMemoryRequirements(vk->device, made.buffer, &needed);

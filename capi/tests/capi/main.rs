@@ -4,3 +4,4 @@ mod drivers;
 mod engine;
 mod header;
 mod install;
+mod misuse;
