@@ -187,6 +187,11 @@ typedef int32_t MeniscusStatus;
 #endif // __cplusplus
 
 /**
+ * Picks among methods, the best first, the best one whose frames take no longer than they may. One thread at a time uses it.
+ */
+typedef struct MeniscusAuto MeniscusAuto;
+
+/**
  * How dense the liquid is anywhere. Any number of threads may read it.
  */
 typedef struct MeniscusDensity MeniscusDensity;
@@ -245,90 +250,6 @@ typedef struct {
      */
     uint32_t reserved;
 } MeniscusCamera;
-
-/**
- * One frame of particles, in world units, in the host's memory. Arrays are read before the call returns.
- */
-typedef struct {
-    /**
-     * sizeof(MeniscusParticles).
-     */
-    size_t struct_size;
-    /**
-     * Centres: three floats each.
-     */
-    const float *positions;
-    /**
-     * How many particles there are.
-     */
-    size_t count;
-    /**
-     * Particle radius: half the rest spacing.
-     */
-    float radius;
-    /**
-     * Below what share of a filled body's density the classes were kept (meniscus_classify's `upper`), or 0.
-     */
-    float keep_class_below;
-    /**
-     * Velocities, three floats each, in world units a second; or null. For spray.
-     */
-    const float *velocities;
-    /**
-     * Classes (MENISCUS_CLASS_...), one byte each, to use instead of the threshold's; or null.
-     */
-    const uint8_t *classes;
-    /**
-     * Semi-axes, three vectors of three floats each, to use instead of fitted ones for particles of the body; or null.
-     */
-    const float *axes;
-    /**
-     * VK_TRUE to leave out what only a density field needs (layers "field", the default).
-     */
-    VkBool32 without_points;
-    /**
-     * 0.
-     */
-    uint32_t reserved;
-} MeniscusParticles;
-
-/**
- * How many particles went which way.
- */
-typedef struct {
-    /**
-     * sizeof(MeniscusReport).
-     */
-    size_t struct_size;
-    /**
-     * Particles drawn as splash.
-     */
-    size_t splash;
-    /**
-     * Particles drawn as body.
-     */
-    size_t body;
-    /**
-     * Of the body, left spheres for want of neighbours.
-     */
-    size_t few_neighbours;
-    /**
-     * Of the body, left spheres because their neighbours coincide.
-     */
-    size_t degenerate;
-    /**
-     * Of the body, cut to the longest semi-axis.
-     */
-    size_t clamped_long;
-    /**
-     * Of the body, thickened to the shortest semi-axis, or to the largest ratio.
-     */
-    size_t clamped_ratio;
-    /**
-     * Splashes that came with an ellipsoid other than the ball they are drawn as.
-     */
-    size_t splash_axes_ignored;
-} MeniscusReport;
 
 /**
  * Positions in device memory, prepared within the frame that draws them: neighbours, classes, shapes, with no word about them to
@@ -496,6 +417,90 @@ typedef struct {
 } MeniscusFrame;
 
 /**
+ * One frame of particles, in world units, in the host's memory. Arrays are read before the call returns.
+ */
+typedef struct {
+    /**
+     * sizeof(MeniscusParticles).
+     */
+    size_t struct_size;
+    /**
+     * Centres: three floats each.
+     */
+    const float *positions;
+    /**
+     * How many particles there are.
+     */
+    size_t count;
+    /**
+     * Particle radius: half the rest spacing.
+     */
+    float radius;
+    /**
+     * Below what share of a filled body's density the classes were kept (meniscus_classify's `upper`), or 0.
+     */
+    float keep_class_below;
+    /**
+     * Velocities, three floats each, in world units a second; or null. For spray.
+     */
+    const float *velocities;
+    /**
+     * Classes (MENISCUS_CLASS_...), one byte each, to use instead of the threshold's; or null.
+     */
+    const uint8_t *classes;
+    /**
+     * Semi-axes, three vectors of three floats each, to use instead of fitted ones for particles of the body; or null.
+     */
+    const float *axes;
+    /**
+     * VK_TRUE to leave out what only a density field needs (layers "field", the default).
+     */
+    VkBool32 without_points;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+} MeniscusParticles;
+
+/**
+ * How many particles went which way.
+ */
+typedef struct {
+    /**
+     * sizeof(MeniscusReport).
+     */
+    size_t struct_size;
+    /**
+     * Particles drawn as splash.
+     */
+    size_t splash;
+    /**
+     * Particles drawn as body.
+     */
+    size_t body;
+    /**
+     * Of the body, left spheres for want of neighbours.
+     */
+    size_t few_neighbours;
+    /**
+     * Of the body, left spheres because their neighbours coincide.
+     */
+    size_t degenerate;
+    /**
+     * Of the body, cut to the longest semi-axis.
+     */
+    size_t clamped_long;
+    /**
+     * Of the body, thickened to the shortest semi-axis, or to the largest ratio.
+     */
+    size_t clamped_ratio;
+    /**
+     * Splashes that came with an ellipsoid other than the ball they are drawn as.
+     */
+    size_t splash_axes_ignored;
+} MeniscusReport;
+
+/**
  * What the host lends a renderer. It keeps all of it alive until meniscus_renderer_destroy has returned, and destroys it
  * itself.
  */
@@ -625,6 +630,69 @@ typedef struct {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * Makes a chooser of `count` methods, those of these settings, the best first, each with a name of its own for messages; and of the
+ * milliseconds that a frame may take on the device.
+ *
+ * # Safety
+ * `names` and `methods` are null or `count` pointers, each null or to text and settings; `chooser` is null or can be written.
+ */
+MeniscusStatus meniscus_auto_create(double budget_ms,
+                                    const char *const *names,
+                                    const MeniscusSettings *const *methods,
+                                    size_t count,
+                                    MeniscusAuto **chooser);
+
+/**
+ * Destroys a chooser; null is none.
+ *
+ * # Safety
+ * `chooser` is null, or a chooser that nobody uses any more.
+ */
+MeniscusStatus meniscus_auto_destroy(MeniscusAuto *chooser);
+
+/**
+ * Compiles what frames like this one need with any of the methods: then no change of method compiles anything. `made`, if it is not
+ * null, tells how many pipelines were made.
+ *
+ * # Safety
+ * `chooser` is null or a chooser, `renderer` null or a renderer; `frame` as in meniscus_renderer_warm_up_like; `made` is null or can
+ * be written.
+ */
+MeniscusStatus meniscus_auto_warm_up(MeniscusAuto *chooser,
+                                     MeniscusRenderer *renderer,
+                                     const MeniscusFrame *frame,
+                                     size_t *made);
+
+/**
+ * Tells which method the next frame is to be drawn with: `pick` its number, to be handed back with what that frame took; and puts it
+ * into settings, if they are not null. Liquid, drawing and preparation stay.
+ *
+ * # Safety
+ * `chooser` is null or a chooser; `pick` is null or can be written; `settings` is null or settings.
+ */
+MeniscusStatus meniscus_auto_pick(MeniscusAuto *chooser,
+                                  size_t *pick,
+                                  MeniscusSettings *settings);
+
+/**
+ * Takes note of what the frame last recorded into a slot took, which was drawn with this pick and has completed.
+ * MENISCUS_STATUS_NOT_READY where the slot has no times yet. `changed`, if it is not null, tells whether another method follows from
+ * it; the text is why the present one was chosen, as in meniscus_last_message, and `length` may be null.
+ *
+ * # Safety
+ * `chooser` is null or a chooser, `renderer` null or a renderer; there is room for `capacity` bytes; `changed` and `length` are null
+ * or can be written.
+ */
+MeniscusStatus meniscus_auto_observe(MeniscusAuto *chooser,
+                                     MeniscusRenderer *renderer,
+                                     uint32_t slot,
+                                     size_t pick,
+                                     VkBool32 *changed,
+                                     char *text,
+                                     size_t capacity,
+                                     size_t *length);
 
 /**
  * Fills a camera, whose struct_size is set, at `eye` that looks at `target`, `fov_y` radians high. Its projection is infinite: the

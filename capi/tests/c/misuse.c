@@ -213,6 +213,41 @@ static void submit(const Vulkan *vk, VkCommandBuffer cmd) {
     VK(vkDeviceWaitIdle(vk->device));
 }
 
+/* The faster of two methods follows when the first takes too long. */
+static void choose(MeniscusRenderer *renderer, const MeniscusFrame *frame) {
+    const char *names[] = {"imai16", "green10"}, *same[] = {"imai16", "imai16"};
+    MeniscusSettings *methods[2];
+    MeniscusAuto *chooser = NULL;
+    VkBool32 changed = VK_FALSE;
+    char why[64], optics[32];
+    size_t pick = 9, before = 9, made = 0;
+    for (int i = 0; i < 2; i++) {
+        OK(meniscus_settings_create(&methods[i]));
+        OK(meniscus_settings_preset(methods[i], names[i]));
+    }
+    const MeniscusSettings *const choices[2] = {methods[0], methods[1]};
+    PARAMETER(meniscus_auto_create(0.0, names, choices, 2, &chooser), "budget_ms is 0");
+    PARAMETER(meniscus_auto_create(1.0, same, choices, 2, &chooser), "two methods are called imai16");
+    PARAMETER(meniscus_auto_create(1.0, NULL, NULL, 0, &chooser), "choices is none");
+    ARGUMENT(meniscus_auto_create(1.0, NULL, choices, 2, &chooser), "names: null for 2");
+    OK(meniscus_auto_create(1e-6, names, choices, 2, &chooser));
+    OK(meniscus_auto_warm_up(chooser, renderer, frame, &made));
+    PARAMETER(meniscus_auto_observe(chooser, renderer, 0, 0, NULL, NULL, 0, NULL), "pick is 0");
+    OK(meniscus_auto_pick(chooser, &before, NULL));
+    NOT_READY(meniscus_auto_observe(chooser, renderer, 7, before, NULL, NULL, 0, NULL), "slot 7");
+    for (int i = 0; i < 4; i++) {
+        TRUE(!changed);
+        OK(meniscus_auto_observe(chooser, renderer, 0, before, &changed, why, sizeof why, NULL));
+    }
+    TRUE(changed && strstr(why, "imai16 took "));
+    OK(meniscus_auto_pick(chooser, &pick, methods[0]));
+    OK(meniscus_settings_member(methods[0], "optics", optics, sizeof optics, NULL));
+    TRUE(before == 0 && pick == 1 && made > 0 && strcmp(optics, "ssfr") == 0);
+    OK(meniscus_auto_destroy(chooser));
+    OK(meniscus_settings_destroy(methods[0]));
+    OK(meniscus_settings_destroy(methods[1]));
+}
+
 /* Draws a frame; what is in the picture. */
 static void draw(const Vulkan *vk, VkCommandBuffer cmd, MeniscusRenderer *renderer, const MeniscusFrame *frame, const Image *picture,
                  const Buffer *readback, unsigned char *pixels) {
@@ -327,6 +362,7 @@ static void frames(const Vulkan *vk, MeniscusRenderer *renderer, const MeniscusS
     TRUE(memcmp(pictures[0], pictures[1], sizeof pictures[0]) != 0);
     TRUE(memcmp(pictures[1], pictures[2], sizeof pictures[0]) == 0);
     TRUE(memcmp(pictures[0], pictures[3], sizeof pictures[0]) != 0);
+    choose(renderer, &f);
     begin(vk, cmd);
     later.more = 1;
     ARGUMENT(meniscus_renderer_record(renderer, cmd, &later.known), "use a newer library");
