@@ -40,6 +40,10 @@ pub struct MeniscusCamera {
 unsafe impl Versioned for MeniscusCamera {
     const NAME: &'static str = "MeniscusCamera";
     const LEAST: usize = offset_of!(MeniscusCamera, up);
+
+    fn reserved(&self) -> u32 {
+        self.reserved
+    }
 }
 
 impl MeniscusCamera {

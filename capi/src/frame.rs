@@ -105,6 +105,10 @@ pub struct MeniscusScene {
 unsafe impl Versioned for MeniscusScene {
     const NAME: &'static str = "MeniscusScene";
     const LEAST: usize = offset_of!(MeniscusScene, reserved);
+
+    fn reserved(&self) -> u32 {
+        self.reserved
+    }
 }
 
 /// An environment of the host's own, in place of the one that the renderer was given: linear light, infinitely far away, sampled in

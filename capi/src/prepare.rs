@@ -48,6 +48,10 @@ pub struct MeniscusParticles {
 unsafe impl Versioned for MeniscusParticles {
     const NAME: &'static str = "MeniscusParticles";
     const LEAST: usize = offset_of!(MeniscusParticles, keep_class_below);
+
+    fn reserved(&self) -> u32 {
+        self.reserved
+    }
 }
 
 /// How many particles went which way.

@@ -13,6 +13,10 @@ pub(crate) unsafe trait Versioned: Copy {
     const NAME: &'static str;
     /// Bytes up to the last field that has to be there.
     const LEAST: usize;
+    /// What keeps a place for a later version, and is 0 in this one.
+    fn reserved(&self) -> u32 {
+        0
+    }
 }
 
 /// Longer than any version will be.
@@ -52,11 +56,11 @@ pub(crate) unsafe fn read<T: Versioned>(from: *const T) -> Result<T, Failure> {
     };
     // SAFETY: as above.
     let rest = unsafe { std::slice::from_raw_parts(from.cast::<u8>().add(known), size - known) };
-    if rest.iter().any(|byte| *byte != 0) {
+    if rest.iter().any(|byte| *byte != 0) || value.reserved() != 0 {
         let name = T::NAME;
         return Err(Failure::argument(format!(
-            "{name} asks for what this library, version {}, does not know: use a newer library, or leave fields after its {} \
-             bytes 0",
+            "{name} asks for what this library, version {}, does not know: use a newer library, or leave what is \
+             reserved, and fields after its {} bytes, 0",
             env!("CARGO_PKG_VERSION"),
             size_of::<T>()
         )));

@@ -311,6 +311,10 @@ static void frames(const Vulkan *vk, MeniscusRenderer *renderer, const MeniscusS
     const MeniscusCamera flat = {.struct_size = sizeof flat};
     f = good, f.camera = &flat;
     PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "camera view");
+    MeniscusCamera odd = camera;
+    odd.reserved = 1;
+    f.camera = &odd;
+    ARGUMENT(meniscus_renderer_record(renderer, cmd, &f), "MeniscusCamera asks for what this library");
     MeniscusEnvironment environment = {.struct_size = sizeof environment, .shape = 9};
     f = good, f.environment = &environment;
     PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "MENISCUS_ENVIRONMENT_");

@@ -135,7 +135,10 @@ fn cmake_finds_the_package() {
     }
     // What asks for another version than this does not get it.
     let text = fs::read_to_string(folder.path().join("CMakeLists.txt")).expect("it was written");
-    write("CMakeLists.txt", &text.replace("meniscus 0.1 ", "meniscus 0.2 "));
-    let refused = Command::new("cmake").args(at).output().expect("it ran before");
-    assert!(!refused.status.success() && String::from_utf8_lossy(&refused.stderr).contains("0.1.0"));
+    for version in ["0.0", "0.1.9", "1"] {
+        write("CMakeLists.txt", &text.replace("meniscus 0.1 ", &format!("meniscus {version} ")));
+        let refused = Command::new("cmake").args(at).output().expect("it ran before");
+        let said = String::from_utf8_lossy(&refused.stderr);
+        assert!(!refused.status.success() && said.contains("version: 0.1.0"), "{version}: {said}");
+    }
 }
