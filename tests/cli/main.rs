@@ -3,6 +3,7 @@
 mod bench;
 mod drivers;
 mod films;
+mod keys;
 mod outputs;
 mod pipelines;
 mod profiling;

@@ -1,6 +1,6 @@
 //! Where to look from.
 
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3};
 use meniscus::{Camera, Ellipsoid, Error, Particles};
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +12,8 @@ pub struct View {
     pub eye: Option<DVec3>,
     /// The middle of the liquid if there is none.
     pub target: Option<DVec3>,
+    /// Degrees that the eye is turned around the target, about up: counter-clockwise as seen from above.
+    pub orbit: f64,
     /// Up, for the camera and the environment.
     pub up: DVec3,
     /// Vertical field of view in degrees.
@@ -20,7 +22,7 @@ pub struct View {
 
 impl Default for View {
     fn default() -> View {
-        View { eye: None, target: None, up: DVec3::Y, fov_y: 40.0 }
+        View { eye: None, target: None, orbit: 0.0, up: DVec3::Y, fov_y: 40.0 }
     }
 }
 
@@ -33,6 +35,9 @@ impl View {
         // Of a vector too long for its length to be a number the direction is nothing.
         if !self.up.normalize().is_normalized() {
             return Err(wrong("up", self.up.to_string(), "use a finite direction that is not zero"));
+        }
+        if !self.orbit.is_finite() {
+            return Err(wrong("orbit", self.orbit.to_string(), "use a finite number of degrees"));
         }
         for (name, point) in [("eye", self.eye), ("target", self.target)] {
             if let Some(point) = point.filter(|p| !p.is_finite()) {
@@ -60,8 +65,10 @@ pub fn frame(
     let whole_target = view.target.unwrap_or(fit_target + origin);
     let target = local(whole_target);
     let whole_eye = view.eye.unwrap_or(fit_eye + (target - fit_target) + origin);
+    let turned = DQuat::from_axis_angle(up, view.orbit.rem_euclid(360.0).to_radians()) * (whole_eye - whole_target);
+    let seen_from = if view.orbit == 0.0 { whole_eye } else { whole_target + turned };
     // By way of the file's coordinates also where it was chosen here: given as such it is the same eye.
-    let eye = local(whole_eye);
+    let eye = local(seen_from);
     let whole = View { eye: Some(whole_eye), target: Some(whole_target), ..*view };
     let apart = (target - eye).normalize_or_zero();
     if !(eye.as_vec3().is_finite() && target.as_vec3().is_finite()) || apart == DVec3::ZERO {

@@ -14,6 +14,7 @@ mod dump;
 mod dump_field;
 mod empty;
 mod info;
+mod keys;
 mod options;
 mod outputs;
 mod picture;

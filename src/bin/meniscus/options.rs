@@ -4,7 +4,8 @@ use crate::{
     choices::{self, Choices},
     picture::{Picture, SUPERSAMPLE},
     scene::Prepare,
-    scene_file, terminal,
+    scene_file::{SceneFile, SceneFileError},
+    terminal,
 };
 use glam::DVec3;
 use meniscus::{Parameters, Preset, io::Budget};
@@ -41,6 +42,10 @@ replacing! {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true,
         help = or("Up, for the camera and the environment", up_text()))]
     up: DVec3 => camera.up;
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, help = or(
+        "Turns the eye around the target: counter-clockwise as seen from above", Picture::default().camera.orbit
+    ))]
+    orbit: f64 => camera.orbit;
     #[arg(long, value_name = "DEG", help = or("Vertical field of view in degrees", Picture::default().camera.fov_y))]
     fov_y: f32 => camera.fov_y;
     /// Equirectangular environment map, .hdr, .exr or .png; a procedural sky if not given. One that is finer than the
@@ -70,6 +75,9 @@ pub struct Options {
     /// Scene file (TOML, as `render --save-scene` writes it); other options come before what it says
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
+    /// Of a scene file with keys: the moment, in seconds of the film; 0 if not given
+    #[arg(long, value_name = "SECONDS", requires = "scene", value_parser = parse_time)]
+    pub time: Option<f64>,
     #[command(flatten)]
     replacing: Replacing,
     /// Drop particles whose position is not finite instead of failing
@@ -102,6 +110,11 @@ fn parse_size(s: &str) -> Result<[u32; 2], String> {
     Ok([w.parse().map_err(|_| wrong())?, h.parse().map_err(|_| wrong())?])
 }
 
+fn parse_time(s: &str) -> Result<f64, String> {
+    let time = s.parse().ok().filter(|t: &f64| t.is_finite() && *t >= 0.0);
+    time.ok_or_else(|| format!("\"{}\" is not a number of seconds, 0 or more", terminal::plain(s)))
+}
+
 fn parse_vector(s: &str) -> Result<DVec3, String> {
     let parts: Result<Vec<f64>, _> = s.split(',').map(|t| t.trim().parse()).collect();
     match parts.as_deref() {
@@ -112,8 +125,13 @@ fn parse_vector(s: &str) -> Result<DVec3, String> {
 
 impl Options {
     /// The scene file's picture, or the default one.
-    pub fn base(&self) -> Result<Picture, scene_file::SceneFileError> {
-        self.scene.as_deref().map_or_else(|| Ok(Picture::default()), scene_file::read)
+    pub fn base(&self) -> Result<Picture, SceneFileError> {
+        self.scene_file()?.map_or_else(|| Ok(Picture::default()), |file| file.at(self.time.unwrap_or(0.0)))
+    }
+
+    /// The scene file, if one is named.
+    pub fn scene_file(&self) -> Result<Option<SceneFile>, SceneFileError> {
+        self.scene.as_deref().map(SceneFile::read).transpose()
     }
 
     /// The picture once for each method, or once as it is, and what its method is called; prepared where these options or the

@@ -1,6 +1,6 @@
 //! Scene files: a [`Picture`] as TOML, read for `--scene` and written for `--save-scene`.
 
-use crate::picture::Picture;
+use crate::{keys::Keys, picture::Picture};
 use meniscus::{Error, io::quote::quote};
 use serde::Deserialize;
 use std::{
@@ -32,40 +32,78 @@ pub enum SceneFileError {
 /// Scene files have some forty lines.
 const LONGEST: u64 = 1 << 20;
 
-/// Reads one. What it does not say is as by default, of the method as in the first that has what it says; its paths are relative
-/// to itself.
+/// What was read of one: a picture for each second of a film, which without keys are all the same.
+pub struct SceneFile {
+    path: PathBuf,
+    table: Table,
+    keys: Keys,
+}
+
+/// The picture of one at the start.
+#[cfg(any(feature = "study", test))]
 pub fn read(path: &Path) -> Result<Picture, SceneFileError> {
-    let failed = |source| SceneFileError::Read { path: path.into(), source };
-    let mut bytes = Vec::new();
-    File::open(path).and_then(|f| f.take(LONGEST + 1).read_to_end(&mut bytes)).map_err(failed)?;
-    if bytes.len() as u64 > LONGEST {
-        return Err(SceneFileError::TooLarge(path.into()));
-    }
-    let text = String::from_utf8(bytes).map_err(|_| SceneFileError::NoText(path.into()))?;
-    let table: Table = text.parse().map_err(|e: toml::de::Error| {
-        let before = e.span().and_then(|s| text.get(..s.start)).unwrap_or("");
-        SceneFileError::Syntax {
-            path: path.into(),
-            line: before.matches('\n').count() + 1,
-            message: quote(e.message()),
+    SceneFile::read(path)?.at(0.0)
+}
+
+impl SceneFile {
+    /// Reads one, and checks all keys and what is between them.
+    pub fn read(path: &Path) -> Result<SceneFile, SceneFileError> {
+        let failed = |source| SceneFileError::Read { path: path.into(), source };
+        let mut bytes = Vec::new();
+        File::open(path).and_then(|f| f.take(LONGEST + 1).read_to_end(&mut bytes)).map_err(failed)?;
+        if bytes.len() as u64 > LONGEST {
+            return Err(SceneFileError::TooLarge(path.into()));
         }
-    })?;
-    let given = |key: &str| table.get("settings")?.get("liquid")?.get(key).map(|_| true);
-    let absorption_given = given(crate::choices::LEFT_OPEN).unwrap_or(false);
-    let mut picture = Picture::deserialize(table.clone()).map_err(|e| {
-        let (key, message) = blame(&table).unwrap_or_else(|| ("scene file".into(), e.message().to_owned()));
-        SceneFileError::Key { path: path.into(), key: quote(&key), message: message.replace('\n', " ") }
-    })?;
-    picture.absorption_given = absorption_given;
-    let method = &mut picture.settings.method;
-    let named = |family: &str| table.get("settings")?.get("method")?.get(family).map(|_| true);
-    *method = crate::choices::completed(method, |family| named(family).unwrap_or(false));
-    picture.validate().map_err(|source| SceneFileError::Value { path: path.into(), source })?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    for file in [&mut picture.particles, &mut picture.environment.file].into_iter().flatten() {
-        *file = folder.join(&*file);
+        let text = String::from_utf8(bytes).map_err(|_| SceneFileError::NoText(path.into()))?;
+        let mut table: Table = text.parse().map_err(|e: toml::de::Error| {
+            let before = e.span().and_then(|s| text.get(..s.start)).unwrap_or("");
+            SceneFileError::Syntax {
+                path: path.into(),
+                line: before.matches('\n').count() + 1,
+                message: quote(e.message()),
+            }
+        })?;
+        let keys = Keys::take(&mut table).map_err(|w| SceneFileError::Key {
+            path: path.into(),
+            key: quote(&w.key),
+            message: w.message.replace('\n', " "),
+        })?;
+        let file = SceneFile { path: path.into(), table, keys };
+        let times = &file.keys.times;
+        let halfway = times.windows(2).map(|w| 0.5 * (w[0] + w[1]));
+        for time in times.iter().copied().chain(halfway) {
+            file.at(time).map_err(|e| match e {
+                SceneFileError::Key { path, key, message } => {
+                    SceneFileError::Key { path, key, message: format!("at {time} seconds: {message}") }
+                }
+                other => other,
+            })?;
+        }
+        Ok(file)
     }
-    Ok(picture)
+
+    /// The picture at a second of the film. What the file does not say is as by default, of the method as in the first that has
+    /// what it says; its paths are relative to itself.
+    pub fn at(&self, time: f64) -> Result<Picture, SceneFileError> {
+        let path = &self.path;
+        let table = self.keys.at(&self.table, time, |table| Picture::deserialize(table.clone()).is_ok());
+        let given = |key: &str| table.get("settings")?.get("liquid")?.get(key).map(|_| true);
+        let absorption_given = given(crate::choices::LEFT_OPEN).unwrap_or(false);
+        let mut picture = Picture::deserialize(table.clone()).map_err(|e| {
+            let (key, message) = blame(&table).unwrap_or_else(|| ("scene file".into(), e.message().to_owned()));
+            SceneFileError::Key { path: path.into(), key: quote(&key), message: message.replace('\n', " ") }
+        })?;
+        picture.absorption_given = absorption_given;
+        let method = &mut picture.settings.method;
+        let named = |family: &str| table.get("settings")?.get("method")?.get(family).map(|_| true);
+        *method = crate::choices::completed(method, |family| named(family).unwrap_or(false));
+        picture.validate().map_err(|source| SceneFileError::Value { path: path.into(), source })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for file in [&mut picture.particles, &mut picture.environment.file].into_iter().flatten() {
+            *file = folder.join(&*file);
+        }
+        Ok(picture)
+    }
 }
 
 /// The first entry that cannot be read when it stands alone, and why: what reads the whole does not say where it is.

@@ -52,7 +52,10 @@ pub struct Args {
     /// Only these numbers, such as 10-250 or 10-250:2
     #[arg(long, value_name = "A-B[:STEP]", allow_hyphen_values = true)]
     pub frames: Option<Selection>,
-    /// Pictures a second, of films
+    /// The eye goes so many degrees around the target over the sequence: 360 is once around, and the end meets the start
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    pub turn: Option<f64>,
+    /// Pictures a second, of films and of the time that a scene file's keys count in
     #[arg(long, value_name = "RATE", default_value_t = 25.0, value_parser = rate)]
     pub fps: f64,
     /// Leave out frames that cannot be read or prepared instead of ending at the first (a film shows the one before them); the
@@ -92,7 +95,10 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
         return Ok(ExitCode::SUCCESS);
     }
     let picture = &plan.shots[0].exposures[0].picture;
-    let environment = picture.environment()?;
+    // As fine as the picture that shows least of it needs it.
+    let views = plan.shots.iter().flat_map(|s| &s.exposures).map(|e| &e.picture);
+    let narrowest = views.min_by(|a, b| a.camera.fov_y.total_cmp(&b.camera.fov_y)).unwrap_or(picture);
+    let environment = narrowest.environment()?;
     let instance = Instance::new(args.validate)?;
     let device = instance.pick(args.options.device.as_deref())?;
     terminal::progress(format!("device: {} ({})", device.name, device.driver));

@@ -79,7 +79,7 @@ impl Frames {
         }
         let column = |c: usize| names.iter().map(|n| n.digits[c].parse().ok()).collect::<Option<Vec<u64>>>();
         let numbers = match files.len() {
-            1 => column(first.digits.len().wrapping_sub(1)).filter(|_| !first.digits.is_empty()).unwrap_or(vec![0]),
+            1 => first.digits.len().checked_sub(1).and_then(column).unwrap_or(vec![0]),
             _ => {
                 let varying = (0..first.digits.len()).filter_map(column).filter(|n| n.iter().any(|v| *v != n[0]));
                 let distinct = |n: &Vec<u64>| {

@@ -50,20 +50,21 @@ struct Settled {
 }
 
 impl Settled {
-    fn of(picture: &Picture, frames: &Frames) -> Result<Option<Settled>, Box<dyn Error>> {
+    fn of(picture: &Picture, frames: &Frames) -> Result<Settled, Box<dyn Error>> {
         let camera = &picture.camera;
-        let given = picture.radius.is_some() && camera.eye.is_some() && camera.target.is_some();
-        if given && picture.absorption_given {
-            return Ok(None);
+        let given = camera.eye.is_some() && camera.target.is_some() && picture.absorption_given;
+        if let Some(radius) = picture.radius.filter(|_| given) {
+            let absorption = picture.settings.liquid.absorption;
+            return Ok(Settled { radius, eye: camera.eye, target: camera.target, absorption });
         }
         let scene = picture.load(Some(&frames.all()[0].file), picture.preparer())?;
         let settled = picture.clone().settled(&scene)?;
-        Ok(Some(Settled {
+        Ok(Settled {
             radius: settled.radius.unwrap_or(f64::from(scene.particles.radius)),
             eye: settled.camera.eye,
             target: settled.camera.target,
             absorption: settled.settings.liquid.absorption,
-        }))
+        })
     }
 
     fn complete(&self, picture: &mut Picture) {
@@ -79,8 +80,18 @@ impl Settled {
 
 impl Plan {
     pub fn new(args: &Args) -> Result<Plan, Box<dyn Error>> {
-        let base = args.options.base()?;
-        let inputs = match &base.particles {
+        if args.options.time.is_some() {
+            return Err("--time is one moment, and a sequence has many: leave it out".into());
+        }
+        let scene_file = args.options.scene_file()?;
+        let base = |time| scene_file.as_ref().map_or_else(|| Ok(Picture::default()), |file| file.at(time));
+        let at = |time| -> Result<Picture, Box<dyn Error>> {
+            let mut picture = args.options.over(base(time)?, None)?;
+            picture.prepare.get_or_insert(Prepare::Cpu);
+            Ok(picture)
+        };
+        let particles = base(0.0)?.particles;
+        let inputs = match &particles {
             Some(particles) if args.inputs.is_empty() => std::slice::from_ref(particles),
             _ => &args.inputs,
         };
@@ -98,17 +109,18 @@ impl Plan {
         others.extend(args.options.scene.as_deref().map(|p| ("the scene file (--scene)", p)));
         others.extend(frames.all().iter().map(|f| ("a particle file", f.file.as_path())));
 
-        let mut picture = args.options.over(base, None)?;
-        picture.prepare.get_or_insert(Prepare::Cpu);
+        let picture = at(0.0)?;
         others.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
         check(args, &named, &others)?;
-        picture.particles = None;
-        if let Some(settled) = Settled::of(&picture, &frames)? {
-            settled.complete(&mut picture);
-        }
+        let settled = Settled::of(&picture, &frames)?;
+        let turn = args.turn.unwrap_or(0.0) / frames.all().len() as f64;
         let mut shots = Vec::new();
         for (frame, number) in numbers.into_iter().enumerate().filter(|(_, n)| wanted(n)) {
-            let exposures = vec![Exposure { picture: picture.clone(), frame }];
+            let mut picture = at(frame as f64 / args.fps)?;
+            picture.particles = None;
+            settled.complete(&mut picture);
+            picture.camera.orbit += turn * frame as f64;
+            let exposures = vec![Exposure { picture, frame }];
             let label = kept::label(&exposures, &frames);
             let files = patterns.iter().map(|p| p.name(number)).collect();
             shots.push(Shot { number, exposures, files, label, kept: false });
