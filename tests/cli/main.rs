@@ -1,6 +1,7 @@
 //! The command line as a user meets it: what it writes, what it refuses, and how it says so.
 
 mod bench;
+mod between;
 mod drivers;
 mod films;
 mod keys;

@@ -4,6 +4,7 @@
 //! frame, whatever their number.
 
 mod ahead;
+mod between;
 mod film;
 mod frames;
 mod kept;
@@ -58,6 +59,19 @@ pub struct Args {
     /// Pictures a second, of films and of the time that a scene file's keys count in
     #[arg(long, value_name = "RATE", default_value_t = 25.0, value_parser = rate)]
     pub fps: f64,
+    /// Simulated seconds from one frame to the next. Pictures are then taken at --fps, between frames too, along paths that the
+    /// particles' velocities give, and are numbered from 0; without, there is one of each frame
+    #[arg(long, value_name = "SECONDS", value_parser = above_zero)]
+    pub step: Option<f64>,
+    /// With --step: simulated seconds in a second of the film; 1 if not given, less is slow motion
+    #[arg(long, value_name = "N", requires = "step", value_parser = above_zero)]
+    pub speed: Option<f64>,
+    /// With --step: motion blur, the mean in linear light of so many moments; 1 if not given, which is none
+    #[arg(long, value_name = "N", requires = "step", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub subframes: Option<u32>,
+    /// With --subframes: the part of a picture's time in which the shutter is open; 0.5 if not given
+    #[arg(long, value_name = "SHARE", requires = "subframes", value_parser = above_zero)]
+    pub shutter: Option<f64>,
     /// Leave out frames that cannot be read or prepared instead of ending at the first (a film shows the one before them); the
     /// exit code is 1 all the same
     #[arg(long)]
@@ -192,6 +206,7 @@ fn expose(
     ready: &Receiver<Result<Ready, String>>,
 ) -> Result<Exposed, Box<dyn Error>> {
     let mut row = Row::new(shot);
+    let mut sum: Option<Vec<[f32; 3]>> = None;
     for exposure in &shot.exposures {
         let begin = Instant::now();
         let next = ready.recv().map_err(|_| "no frame came from the thread that reads them; report this")?;
@@ -200,8 +215,21 @@ fn expose(
             Ok(ready) => draw(args, exposure, &ready, session, &mut row)?,
             Err(why) => return Ok(Err(why)),
         }
+        let pixels = session.picture()?;
+        match &mut sum {
+            None => sum = Some(pixels),
+            Some(sum) => add(sum, &pixels),
+        }
     }
-    Ok(Ok((session.picture()?, row)))
+    let mut pixels = sum.ok_or("a picture without an exposure; report this")?;
+    if let count @ 2.. = shot.exposures.len() {
+        pixels.as_flattened_mut().iter_mut().for_each(|v| *v /= count as f32);
+    }
+    Ok(Ok((pixels, row)))
+}
+
+fn add(sum: &mut [[f32; 3]], pixels: &[[f32; 3]]) {
+    sum.as_flattened_mut().iter_mut().zip(pixels.as_flattened()).for_each(|(sum, v)| *sum += v);
 }
 
 /// Draws one moment into the session's picture.
@@ -229,6 +257,11 @@ fn draw(
         row.count(scene, &report, ready);
     }
     Ok(())
+}
+
+fn above_zero(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|v| (1e-9..=1e9).contains(v));
+    number.ok_or_else(|| format!("\"{}\" is no such number: use 1e-9 to 1e9", terminal::plain(text)))
 }
 
 fn rate(text: &str) -> Result<f64, String> {

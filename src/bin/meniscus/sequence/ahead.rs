@@ -1,10 +1,12 @@
 //! Reading and preparing the next frame while this one is drawn.
 
 use super::{
+    between::{Moment, between},
     ms_since,
     plan::{Exposure, Plan},
 };
-use crate::scene::Scene;
+use crate::{picture::Picture, scene::Scene};
+use meniscus::io::particles::{ParticleFile, ReadError};
 use std::{
     error::Error,
     sync::mpsc::{Receiver, sync_channel},
@@ -25,9 +27,10 @@ pub struct Ready {
 pub fn start<'s>(scope: &'s Scope<'s, '_>, plan: &'s Plan) -> Receiver<Result<Ready, String>> {
     let (give, ready) = sync_channel(0);
     scope.spawn(move || {
+        let mut read = Read::default();
         for shot in plan.shots.iter().filter(|s| !s.kept) {
             for exposure in &shot.exposures {
-                let next = load(plan, exposure).map_err(|e| e.to_string());
+                let next = load(plan, exposure, &mut read).map_err(|e| e.to_string());
                 let failed = next.is_err();
                 if give.send(next).is_err() {
                     return; // nobody draws any more
@@ -41,12 +44,53 @@ pub fn start<'s>(scope: &'s Scope<'s, '_>, plan: &'s Plan) -> Receiver<Result<Re
     ready
 }
 
-fn load(plan: &Plan, exposure: &Exposure) -> Result<Ready, Box<dyn Error>> {
-    let (picture, file) = (&exposure.picture, Some(plan.frames.all()[exposure.frame].file.as_path()));
+/// What was read of frames that are needed again: two at most.
+#[derive(Default)]
+struct Read(Vec<(usize, (ParticleFile, usize))>);
+
+impl Read {
+    /// A frame's particles.
+    fn frame(&mut self, plan: &Plan, picture: &Picture, frame: usize) -> Result<&(ParticleFile, usize), ReadError> {
+        let at = match self.0.iter().position(|(f, _)| *f == frame) {
+            Some(at) => at,
+            None => {
+                self.0.retain(|(f, _)| *f + 1 == frame);
+                self.0.push((frame, Scene::read(picture, Some(&plan.frames.all()[frame].file))?));
+                self.0.len() - 1
+            }
+        };
+        Ok(&self.0[at].1)
+    }
+
+    /// The particles of a moment.
+    fn moment(
+        &mut self,
+        plan: &Plan,
+        picture: &Picture,
+        moment: &Moment,
+    ) -> Result<(ParticleFile, usize), Box<dyn Error>> {
+        let frames = plan.frames.all();
+        if !plan.between {
+            return Ok(Scene::read(picture, Some(&frames[moment.frame].file))?);
+        }
+        if moment.toward == 0.0 {
+            return Ok(self.frame(plan, picture, moment.frame)?.clone());
+        }
+        self.frame(plan, picture, moment.frame)?;
+        self.frame(plan, picture, moment.frame + 1)?;
+        let [a, b] = [0, 1].map(|i| moment.frame + i).map(|f| self.0.iter().find(|(frame, _)| *frame == f));
+        let (Some((i, a)), Some((j, b))) = (a, b) else { return Err("a frame was not kept; report this".into()) };
+        Ok((between((&frames[*i], a), (&frames[*j], b), moment)?, 0))
+    }
+}
+
+fn load(plan: &Plan, exposure: &Exposure, read: &mut Read) -> Result<Ready, Box<dyn Error>> {
+    let picture = &exposure.picture;
     let begin = Instant::now();
-    let read = Scene::read(picture, file)?;
+    let particles = read.moment(plan, picture, &exposure.moment)?;
     let read_ms = ms_since(begin);
     let begin = Instant::now();
-    let scene = picture.prepared(read, file, picture.preparer())?;
+    let file = plan.frames.all()[exposure.moment.frame].file.as_path();
+    let scene = picture.prepared(particles, Some(file), picture.preparer())?;
     Ok(Ready { scene, read_ms, prepare_ms: ms_since(begin) })
 }

@@ -108,6 +108,11 @@ impl Frames {
         &self.all
     }
 
+    /// When a frame comes, counted in frames from the first; where numbers are missing there is time between.
+    pub fn place(&self, index: usize) -> f64 {
+        (self.all[index].number - self.all[0].number) as f64 / self.stride as f64
+    }
+
     /// Where numbers are missing: the last before and the first after.
     pub fn gaps(&self) -> Vec<(u64, u64)> {
         let pairs = self.all.windows(2).map(|w| (w[0].number, w[1].number));
@@ -238,10 +243,11 @@ mod tests {
     }
 
     #[test]
-    fn missing_numbers_are_known() {
+    fn missing_numbers_are_known_and_take_time() {
         let files = ["f10", "f20", "f30", "f60"].map(PathBuf::from).to_vec();
         let frames = Frames::of(files).expect("frames");
         assert_eq!(frames.gaps(), [(30, 60)]);
+        assert_eq!((0..4).map(|i| frames.place(i)).collect::<Vec<_>>(), [0.0, 1.0, 2.0, 5.0]);
     }
 
     #[test]

@@ -18,7 +18,13 @@ pub fn label(exposures: &[Exposure], frames: &Frames) -> String {
         let environment = picture.environment.file.take();
         add(picture.record().to_string().as_bytes());
         add(environment.as_deref().map(identity).unwrap_or_default().as_bytes());
-        add(identity(&frames.all()[exposure.frame].file).as_bytes());
+        let moment = &exposure.moment;
+        add(identity(&frames.all()[moment.frame].file).as_bytes());
+        if moment.toward > 0.0 {
+            add(identity(&frames.all()[moment.frame + 1].file).as_bytes());
+            add(&moment.toward.to_le_bytes());
+            add(&moment.interval.to_le_bytes());
+        }
     }
     hash.finalize().to_hex().to_string()
 }

@@ -1,7 +1,9 @@
 //! What a sequence consists of: which picture is of which frame, from where and how it is seen, and whether it is there already.
 
 use super::{
-    Args, check,
+    Args,
+    between::{Moment, Times},
+    check,
     film::Kind,
     frames::{Frames, FramesError, Pattern},
     kept,
@@ -29,12 +31,13 @@ pub struct Shot {
 pub struct Exposure {
     /// With nothing left open.
     pub picture: Picture,
-    /// Which of the frames.
-    pub frame: usize,
+    pub moment: Moment,
 }
 
 pub struct Plan {
     pub frames: Frames,
+    /// Whether pictures are taken between frames.
+    pub between: bool,
     pub shots: Vec<Shot>,
     /// Made anew, of all pictures.
     pub films: Vec<(PathBuf, Kind)>,
@@ -97,7 +100,9 @@ impl Plan {
         };
         let frames = Frames::find(inputs)?;
         let patterns = patterns(args)?;
-        let numbers: Vec<_> = frames.all().iter().map(|f| f.number).collect();
+        let times = Times::new(args, &frames);
+        let pictures = times.pictures();
+        let numbers: Vec<_> = pictures.iter().map(|p| p.0).collect();
         let wanted = |n: &u64| args.frames.is_none_or(|s| s.has(*n));
         let (first, last) = (numbers[0], numbers[numbers.len() - 1]);
         let named: Vec<_> =
@@ -113,14 +118,19 @@ impl Plan {
         others.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
         check(args, &named, &others)?;
         let settled = Settled::of(&picture, &frames)?;
-        let turn = args.turn.unwrap_or(0.0) / frames.all().len() as f64;
+        // All of it over all pictures: a film that begins anew goes on turning.
+        let turn = args.turn.unwrap_or(0.0) / pictures.len() as f64;
         let mut shots = Vec::new();
-        for (frame, number) in numbers.into_iter().enumerate().filter(|(_, n)| wanted(n)) {
-            let mut picture = at(frame as f64 / args.fps)?;
-            picture.particles = None;
-            settled.complete(&mut picture);
-            picture.camera.orbit += turn * frame as f64;
-            let exposures = vec![Exposure { picture, frame }];
+        for (number, exposed) in pictures.iter().filter(|p| wanted(&p.0)) {
+            let expose = |time: &f64| -> Result<_, Box<dyn Error>> {
+                let mut picture = at(*time)?;
+                picture.particles = None;
+                settled.complete(&mut picture);
+                picture.camera.orbit += turn * (time * args.fps);
+                Ok(Exposure { picture, moment: times.moment(*time) })
+            };
+            let exposures = exposed.iter().map(expose).collect::<Result<Vec<_>, _>>()?;
+            let number = *number;
             let label = kept::label(&exposures, &frames);
             let files = patterns.iter().map(|p| p.name(number)).collect();
             shots.push(Shot { number, exposures, files, label, kept: false });
@@ -129,7 +139,7 @@ impl Plan {
         let finished = |s: &Shot| !s.files.is_empty() && s.files.iter().all(|f| kept::finished(f, &s.label, size));
         shots.par_iter_mut().for_each(|s| s.kept = finished(s));
         let films = args.output.iter().filter_map(|p| Some((p.clone(), Kind::of(p)?))).collect();
-        Ok(Plan { frames, shots, films })
+        Ok(Plan { frames, between: args.step.is_some(), shots, films })
     }
 
     /// The first picture's name, and the last one's; and films.

@@ -94,7 +94,7 @@ impl<'a> Table<'a> {
 
     pub fn add(&mut self, row: Row) -> Result<(), OutputError> {
         let shot = self.plan.shots.iter().find(|s| s.number == row.number);
-        let file = shot.map(|s| self.plan.frames.all()[s.exposures[0].frame].file.display().to_string());
+        let file = shot.map(|s| self.plan.frames.all()[s.exposures[0].moment.frame].file.display().to_string());
         self.rows.insert(row.number, row.cells(file.unwrap_or_default()));
         let begin = Instant::now();
         if begin < self.due {

@@ -1,0 +1,126 @@
+//! Moments between the frames of a simulation, where particles have velocities, and when they are.
+
+use super::{
+    Args,
+    frames::{Frame, Frames},
+};
+use glam::DVec3;
+use meniscus::io::particles::ParticleFile;
+use std::path::PathBuf;
+
+/// Why there is nothing between two frames.
+#[derive(Debug, thiserror::Error)]
+pub enum BetweenError {
+    #[error(
+        "{} has {count} particles and {} has {next_count}: between them none can be followed. Leave out --step, which takes frames as \
+         they are", file.display(), next.display()
+    )]
+    Count { file: PathBuf, count: usize, next: PathBuf, next_count: usize },
+    #[error("{}: has no velocities, by which particles get from frame to frame. Export them, or leave out --step", .0.display())]
+    NoVelocities(PathBuf),
+    #[error("{}: particles were left out of it (--drop-invalid), so that none can be followed. Leave out --step", .0.display())]
+    Dropped(PathBuf),
+}
+
+/// A moment: a frame, and how far it is on the way to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    pub frame: usize,
+    /// 0 to less than 1.
+    pub toward: f64,
+    /// Simulated seconds from that frame to the next.
+    pub interval: f64,
+}
+
+/// When pictures are taken.
+pub struct Times<'a> {
+    frames: &'a Frames,
+    /// Simulated seconds between frames; pictures are of frames alone if there are none.
+    step: Option<f64>,
+    /// Simulated seconds of a second of the film.
+    speed: f64,
+    fps: f64,
+    subframes: u32,
+    /// Part of a picture's time in which it is exposed.
+    shutter: f64,
+}
+
+impl<'a> Times<'a> {
+    pub fn new(args: &Args, frames: &'a Frames) -> Times<'a> {
+        let (speed, shutter) = (args.speed.unwrap_or(1.0), args.shutter.unwrap_or(0.5));
+        Times { frames, step: args.step, speed, fps: args.fps, subframes: args.subframes.unwrap_or(1), shutter }
+    }
+
+    /// Each picture's number, and the seconds of the film at which it is exposed.
+    pub fn pictures(&self) -> Vec<(u64, Vec<f64>)> {
+        let Some(step) = self.step else {
+            let frames = self.frames.all().iter().enumerate();
+            return frames.map(|(i, f)| (f.number, vec![i as f64 / self.fps])).collect();
+        };
+        let end = self.frames.place(self.frames.all().len() - 1) * step / self.speed;
+        // A last picture that rounding puts a little behind the end is there.
+        let count = (end * self.fps + 1e-6).floor() as u64 + 1;
+        let exposed = |k: u64| {
+            let open = |j: u32| (f64::from(j) + 0.5) / f64::from(self.subframes) - 0.5;
+            (0..self.subframes).map(move |j| ((k as f64 + self.shutter * open(j)) / self.fps).clamp(0.0, end)).collect()
+        };
+        (0..count).map(|k| (k, exposed(k))).collect()
+    }
+
+    /// What the simulation is like at a second of the film.
+    pub fn moment(&self, time: f64) -> Moment {
+        let Some(step) = self.step else {
+            return Moment { frame: (time * self.fps).round() as usize, toward: 0.0, interval: 0.0 };
+        };
+        let (place, last) = (time * self.speed / step, self.frames.all().len() - 1);
+        // Nearer to a frame than rounding may put it is that frame.
+        let near = 1e-6;
+        let frame = (0..=last).rev().find(|i| self.frames.place(*i) <= place + near).unwrap_or(0);
+        if frame == last || place - self.frames.place(frame) <= near {
+            return Moment { frame, toward: 0.0, interval: 0.0 };
+        }
+        let (from, to) = (self.frames.place(frame), self.frames.place(frame + 1));
+        Moment { frame, toward: (place - from) / (to - from), interval: (to - from) * step }
+    }
+}
+
+/// Particles on their way from one frame to the next: along cubics that have both frames' positions and velocities.
+pub fn between(
+    (first, a): (&Frame, &(ParticleFile, usize)),
+    (second, b): (&Frame, &(ParticleFile, usize)),
+    moment: &Moment,
+) -> Result<ParticleFile, BetweenError> {
+    for (frame, (_, dropped)) in [(first, a), (second, b)] {
+        if *dropped > 0 {
+            return Err(BetweenError::Dropped(frame.file.clone()));
+        }
+    }
+    let (a, b) = (&a.0, &b.0);
+    let (count, next_count) = (a.positions.len(), b.positions.len());
+    if count != next_count {
+        let (file, next) = (first.file.clone(), second.file.clone());
+        return Err(BetweenError::Count { file, count, next, next_count });
+    }
+    let velocities = |frame: &Frame, file: &'_ ParticleFile| {
+        file.velocities.is_some().then_some(()).ok_or_else(|| BetweenError::NoVelocities(frame.file.clone()))
+    };
+    velocities(first, a)?;
+    velocities(second, b)?;
+    let none = Vec::new();
+    let (va, vb) = (a.velocities.as_ref().unwrap_or(&none), b.velocities.as_ref().unwrap_or(&none));
+    let (s, dt) = (moment.toward, moment.interval);
+    let (s2, s3) = (s * s, s * s * s);
+    let along = |i: usize| -> DVec3 {
+        let ends = (2.0 * s3 - 3.0 * s2 + 1.0) * a.positions[i] + (3.0 * s2 - 2.0 * s3) * b.positions[i];
+        ends + dt * ((s3 - 2.0 * s2 + s) * va[i] + (s3 - s2) * vb[i])
+    };
+    let nearer = if s < 0.5 { a } else { b };
+    Ok(ParticleFile {
+        positions: (0..count).map(along).collect(),
+        velocities: Some((0..count).map(|i| va[i].lerp(vb[i], s)).collect()),
+        radius: nearer.radius,
+        support: nearer.support,
+        classes: nearer.classes.clone(),
+        axes: nearer.axes.clone(),
+    })
+}
