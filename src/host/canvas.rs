@@ -69,6 +69,16 @@ impl<'a> Canvas<'a> {
         Ok(canvas)
     }
 
+    /// The image, for copies of the host's own.
+    pub fn image(&self) -> vk::Image {
+        self.image
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
     /// Records a barrier between two accesses; `from` may be `UNDEFINED` with everything before.
     pub fn transition(&self, cmd: vk::CommandBuffer, from: vk::ImageLayout, to: vk::ImageLayout) {
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
@@ -118,20 +128,14 @@ impl<'a> Canvas<'a> {
         vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent)
     }
 
-    /// The pixels, row by row, after a frame that left them in `COLOR_ATTACHMENT_OPTIMAL`.
+    /// The pixels, row by row, after a frame that left them in `COLOR_ATTACHMENT_OPTIMAL`; there they stay.
     pub fn read(&self) -> Result<Vec<u8>, HostError> {
+        let (drawn, source) = (vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
         self.gpu.read_back(self.bytes(), |cmd, buffer| {
-            self.transition(cmd, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
+            self.transition(cmd, drawn, source);
             // SAFETY: `cmd` is recording; the buffer holds the whole image.
-            unsafe {
-                self.gpu.device.cmd_copy_image_to_buffer(
-                    cmd,
-                    self.image,
-                    vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
-                    buffer,
-                    &[self.whole()],
-                )
-            };
+            unsafe { self.gpu.device.cmd_copy_image_to_buffer(cmd, self.image, source, buffer, &[self.whole()]) };
+            self.transition(cmd, source, drawn);
             Ok(())
         })
     }

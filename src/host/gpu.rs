@@ -44,6 +44,11 @@ impl<'a> Gpu<'a> {
         Gpu::with(instance, info, &[name.as_ptr()], vk::DeviceCreateInfo::default().push_next(&mut tells))
     }
 
+    /// A device that also presents to surfaces.
+    pub fn presenting(instance: &'a Instance, info: DeviceInfo) -> Result<Gpu<'a>, HostError> {
+        Gpu::with(instance, info, &[ash::khr::swapchain::NAME.as_ptr()], vk::DeviceCreateInfo::default())
+    }
+
     fn with(
         instance: &'a Instance,
         info: DeviceInfo,
@@ -86,6 +91,16 @@ impl<'a> Gpu<'a> {
         })?;
         gpu.allocator = Some(Arc::new(Mutex::new(allocator)));
         Ok(gpu)
+    }
+
+    /// Its queue, for a host that submits by itself; not to be used from two threads at once.
+    pub fn queue(&self) -> vk::Queue {
+        self.queue
+    }
+
+    /// The instance that it is of.
+    pub fn instance(&self) -> &'a Instance {
+        self.instance
     }
 
     /// What is lent to a [`crate::Renderer`].

@@ -12,6 +12,7 @@ use ash::vk;
 pub use canvas::Canvas;
 pub use gpu::Gpu;
 pub use session::Session;
+use std::ffi::CStr;
 pub use upload::Upload;
 pub use validation::Messages;
 
@@ -47,6 +48,11 @@ pub enum HostError {
         "the validation layer VK_LAYER_KHRONOS_validation is not installed: install vulkan-validationlayers, or set VK_LAYER_PATH"
     )]
     NoValidation,
+    /// An extension of the instance is not there.
+    #[error(
+        "Vulkan here has no {0}, which a window needs: install libvulkan1 and a driver that presents (mesa-vulkan-drivers does)"
+    )]
+    NoExtension(String),
     /// A Vulkan call failed.
     #[error("{0}: {1}{remedy}", remedy = remedy(*.1))]
     Vulkan(&'static str, vk::Result),
@@ -107,6 +113,16 @@ pub struct DeviceInfo {
 }
 
 impl DeviceInfo {
+    /// The physical device, of the instance that listed it.
+    pub fn handle(&self) -> vk::PhysicalDevice {
+        self.handle
+    }
+
+    /// The queue family that is used: graphics and compute.
+    pub fn family(&self) -> u32 {
+        self.family
+    }
+
     /// Name and driver. Two versions of one driver may name a device alike: this tells them apart.
     pub fn label(&self) -> String {
         format!("{}, {}", self.name, self.driver)
@@ -120,7 +136,7 @@ impl DeviceInfo {
 
 /// An instance, with or without validation.
 pub struct Instance {
-    _entry: ash::Entry,
+    entry: ash::Entry,
     handle: ash::Instance,
     debug: Option<ash::ext::debug_utils::Instance>,
     messenger: vk::DebugUtilsMessengerEXT,
@@ -130,6 +146,11 @@ pub struct Instance {
 impl Instance {
     /// `validate`: core and synchronization validation, every message kept in [`Instance::messages`].
     pub fn new(validate: bool) -> Result<Instance, HostError> {
+        Instance::with(validate, &[])
+    }
+
+    /// The same with these extensions, for a host that presents.
+    pub fn with(validate: bool, wanted: &[&CStr]) -> Result<Instance, HostError> {
         // SAFETY: loading the system's Vulkan loader runs its initialisers; that is what a Vulkan program does.
         let entry = unsafe { ash::Entry::load() }.map_err(HostError::Loader)?;
         // SAFETY: as above; no handles are involved yet.
@@ -144,7 +165,11 @@ impl Instance {
         }
         let debug_extension = ash::ext::debug_utils::NAME;
         let debug = validate || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(debug_extension));
-        let mut extension_names = Vec::new();
+        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        if let Some(missing) = wanted.iter().find(|name| !has(name)) {
+            return Err(HostError::NoExtension(missing.to_string_lossy().into_owned()));
+        }
+        let mut extension_names: Vec<_> = wanted.iter().map(|name| name.as_ptr()).collect();
         if debug {
             extension_names.push(debug_extension.as_ptr());
         }
@@ -172,9 +197,9 @@ impl Instance {
             e => no_driver(e),
         })?;
         let mut instance =
-            Instance { debug: None, messenger: vk::DebugUtilsMessengerEXT::null(), messages, handle, _entry: entry };
+            Instance { debug: None, messenger: vk::DebugUtilsMessengerEXT::null(), messages, handle, entry };
         if debug {
-            let utils = ash::ext::debug_utils::Instance::new(&instance._entry, &instance.handle);
+            let utils = ash::ext::debug_utils::Instance::new(&instance.entry, &instance.handle);
             if let Some(m) = instance.messages.as_deref() {
                 // SAFETY: as above.
                 instance.messenger =
@@ -184,6 +209,11 @@ impl Instance {
             instance.debug = Some(utils);
         }
         Ok(instance)
+    }
+
+    /// The loader, and the instance: for surfaces.
+    pub fn handles(&self) -> (&ash::Entry, &ash::Instance) {
+        (&self.entry, &self.handle)
     }
 
     /// Validation messages so far, oldest first; empty without validation.
@@ -228,9 +258,7 @@ impl Instance {
             vk::PhysicalDeviceType::CPU => (4, "CPU"),
             _ => (5, "other"),
         };
-        let text = |s: Result<&std::ffi::CStr, _>| {
-            s.map(|s: &std::ffi::CStr| s.to_string_lossy().into_owned()).unwrap_or_default()
-        };
+        let text = |s: Result<&CStr, _>| s.map(|s: &CStr| s.to_string_lossy().into_owned()).unwrap_or_default();
         let v = properties.api_version;
         DeviceInfo {
             name: device::name(&properties),

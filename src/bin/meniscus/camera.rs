@@ -61,7 +61,10 @@ pub fn frame(
     let up = view.up.normalize();
     let fov = view.fov_y.to_radians();
     let local = |p: DVec3| p - origin;
-    let (fit_eye, fit_target) = fit(up, f64::from(fov), f64::from(aspect), particles);
+    let (fit_eye, fit_target) = match (view.eye, view.target) {
+        (Some(eye), Some(target)) => (local(eye), local(target)),
+        _ => fit(up, f64::from(fov), f64::from(aspect), particles),
+    };
     let whole_target = view.target.unwrap_or(fit_target + origin);
     let target = local(whole_target);
     let whole_eye = view.eye.unwrap_or(fit_eye + (target - fit_target) + origin);

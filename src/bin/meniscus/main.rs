@@ -34,6 +34,8 @@ mod terminal;
 mod truth;
 #[cfg(feature = "study")]
 mod tune;
+#[cfg(feature = "view")]
+mod view;
 
 use clap::{Parser, Subcommand, error::ContextValue};
 use meniscus::host::{DeviceInfo, HostError};
@@ -74,6 +76,9 @@ enum Command {
     /// Find the cheapest settings within an error, or the best within a time, and write them as a scene file
     #[cfg(feature = "study")]
     Tune(Box<tune::Args>),
+    /// Show particles in a window: fly around them, play a sequence, change method and parameters, two methods side by side
+    #[cfg(feature = "view")]
+    View(Box<view::Args>),
     /// Print what a driver's compiler makes of a method's shaders: registers, spills, occupancy; needs no GPU
     Pipelines(Box<pipelines::Args>),
     /// List devices, drivers, features, limits and file formats.
@@ -114,6 +119,8 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         Command::Stress(args) => stress::run(&args),
         #[cfg(feature = "study")]
         Command::Tune(args) => tune::run(&args),
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(&args),
         Command::Pipelines(args) => pipelines::run(&args),
         Command::Info => info::run(),
     }

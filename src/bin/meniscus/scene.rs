@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
-    Class, Ellipsoid, Particles, Point, Settings,
+    Class, Ellipsoid, Particles, Point, Renderer, Settings,
     host::{Session, Upload},
     io::particles::{Invalid, ParticleFile, ReadError, check_finite, read_bytes, read_within},
     layers::Layers,
@@ -193,14 +193,18 @@ impl Scene {
         if prepare.on_device() {
             return Ok(Some(Upload::new(session.gpu, bytemuck::cast_slice(&self.positions))?));
         }
-        session.renderer.set_particles(&self.particles)?;
-        if let Some(speeds) = &self.speeds {
-            session.renderer.set_speeds(speeds)?;
-        }
-        if let Layers::Field(_) = settings.method.layers {
-            session.renderer.set_points(&self.points()?)?;
-        }
+        let points = if let Layers::Field(_) = settings.method.layers { Some(self.points()?) } else { None };
+        self.give_to(&mut session.renderer, points.as_deref())?;
         Ok(None)
+    }
+
+    /// Gives its particles, as the CPU prepared them, to a renderer; and the points that a density field is made of.
+    pub fn give_to(&self, renderer: &mut Renderer, points: Option<&[Point]>) -> Result<(), meniscus::Error> {
+        renderer.set_particles(&self.particles)?;
+        if let Some(speeds) = &self.speeds {
+            renderer.set_speeds(speeds)?;
+        }
+        points.map_or(Ok(()), |points| renderer.set_points(points))
     }
 
     /// What a density field is made of, as the CPU prepares it.
