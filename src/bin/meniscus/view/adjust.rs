@@ -183,7 +183,9 @@ mod tests {
                 let (mut up, mut down) = (start, start);
                 let steps = [e.step(&mut up, 1).is_ok(), e.step(&mut down, -1).is_ok()];
                 let changed = up != start || down != start;
-                assert!(changed, "{} {}: {steps:?}, {}", preset.name, e.name(), e.value(&start));
+                // Maps refuse to follow reflections.
+                let refused = e.name() == "trace-reflections" && preset.name != "field";
+                assert!(changed != refused, "{} {}: {steps:?}, {}", preset.name, e.name(), e.value(&start));
                 for s in [up, down] {
                     assert!(s.settings.validate().is_ok() && s.preparation.validate().is_ok());
                 }
@@ -201,6 +203,7 @@ mod tests {
         let before: u32 = window.value(&s).parse().expect("a number");
         window.step(&mut s, 1).expect("a step");
         assert_eq!(entry(&s, "window").value(&s), (before + 2).to_string());
+        let mut s = of("imai16");
         let method = entry(&s, "method");
         (0..PRESETS.len()).for_each(|_| method.step(&mut s, 1).expect("a preset"));
         assert_eq!(method.value(&s), "imai16");
