@@ -6,11 +6,11 @@ use crate::{
     device::name,
     frame::{self, Scene},
     pipeline::Pipeline,
-    plan::{Plan, Recipe},
+    plan::Recipe,
     renderer::Amount,
 };
 use ash::{khr::pipeline_executable_properties as executables, vk};
-use std::{collections::HashSet, ffi::CStr};
+use std::ffi::CStr;
 
 /// The device extension that tells it. A device for [`compile`] is created with it and with the feature
 /// `pipelineExecutableInfo`.
@@ -61,20 +61,13 @@ pub unsafe fn compile(
     let plan = frame::plan(&scene)?;
     let tells = executables::Device::new(&host.instance, &host.device);
     let mut all = Vec::new();
-    for (pass, recipe) in first_uses(&plan) {
+    for (pass, recipe) in plan.pipelines() {
         let mut pipeline = Pipeline::new(host, recipe, vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR)?;
         let told = stages(&tells, pipeline.handle, pass, recipe);
         pipeline.destroy(host);
         all.extend(told.map_err(Error::vulkan(recipe.name()))?);
     }
     Ok(all)
-}
-
-/// Each pipeline that a frame binds, and the pass that binds it first.
-fn first_uses(plan: &Plan) -> Vec<(&'static str, &Recipe)> {
-    let mut known = HashSet::new();
-    let calls = plan.steps.iter().flat_map(|step| step.calls().map(|call| (step.pass, &call.recipe)));
-    calls.filter(|(_, recipe)| known.insert(*recipe)).collect()
 }
 
 /// Refuses a device that does not tell.

@@ -3,6 +3,7 @@
 use crate::{
     frame::{MeniscusFrame, Read},
     renderer::{MeniscusRenderer, Whole, with},
+    report::times,
     settings::MeniscusSettings,
     status::{Failure, MeniscusStatus, guard},
     text,
@@ -160,8 +161,7 @@ pub unsafe extern "C" fn meniscus_auto_observe(
         with(renderer, |renderer| {
             borrow_mut(chooser, "the chooser")?.whole.with(|choices| {
                 let pick = choices.picked(pick)?;
-                let none = || Failure::new(MeniscusStatus::NotReady, format!("slot {slot} has no times yet"));
-                let times = renderer.times(slot as usize).ok_or_else(none)?;
+                let times = times(renderer, slot)?;
                 tell(changed, VkBool32::from(choices.auto.observe(pick, &times, &[]).is_some()));
                 text::put(&choices.auto.why().to_string(), text, capacity, length)
             })

@@ -8,7 +8,7 @@ use crate::{
     text,
     versioned::{Element, borrow, fill, read_some, tell},
 };
-use renderer::{LedgerEntry, ash::vk::Bool32 as VkBool32, renderer::Amount};
+use renderer::{LedgerEntry, Renderer, ash::vk::Bool32 as VkBool32, profile::FrameTimes, renderer::Amount};
 use std::ffi::c_char;
 
 /// GPU time of one pass.
@@ -58,6 +58,12 @@ fn memory(entry: &LedgerEntry) -> MeniscusMemory {
     MeniscusMemory { name, bytes: entry.bytes, per_particle, reserved: 0 }
 }
 
+/// Times of the frame last recorded into a slot.
+pub(crate) fn times(renderer: &Renderer, slot: u32) -> Result<FrameTimes, Failure> {
+    let none = || Failure::new(MeniscusStatus::NotReady, format!("slot {slot} has no times yet"));
+    renderer.times(slot as usize).ok_or_else(none)
+}
+
 /// Tells the GPU times of the frame last recorded into a slot, which has completed; does not wait. MENISCUS_STATUS_NOT_READY before
 /// the first, or where the queue has no timestamps.
 ///
@@ -79,8 +85,7 @@ pub unsafe extern "C" fn meniscus_renderer_times(
     // SAFETY: this function's contract.
     unsafe {
         with(renderer, |renderer| {
-            let none = || Failure::new(MeniscusStatus::NotReady, format!("slot {slot} has no times yet"));
-            let times = renderer.times(slot as usize).ok_or_else(none)?;
+            let times = times(renderer, slot)?;
             let pass = |p: &renderer::profile::PassTime| MeniscusPassTime {
                 name: text::array(&p.name),
                 part: text::array(p.part),

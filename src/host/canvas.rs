@@ -139,6 +139,12 @@ impl<'a> Canvas<'a> {
             Ok(())
         })
     }
+
+    /// The same as RGB, of four floats a pixel.
+    pub fn picture(&self) -> Result<Vec<[f32; 3]>, HostError> {
+        let float = |at: &[u8]| f32::from_ne_bytes([at[0], at[1], at[2], at[3]]);
+        Ok(self.read()?.chunks_exact(16).map(|p| [float(p), float(&p[4..]), float(&p[8..])]).collect())
+    }
 }
 
 impl Drop for Canvas<'_> {

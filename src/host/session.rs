@@ -62,7 +62,7 @@ impl<'a> Session<'a> {
 
     /// The picture as last rendered: linear RGB, row by row.
     pub fn picture(&self) -> Result<Vec<[f32; 3]>, HostError> {
-        Ok(floats(&self.canvas.read()?).chunks_exact(4).map(|c| [c[0], c[1], c[2]]).collect())
+        self.canvas.picture()
     }
 
     /// The words of one layer of a target, or of a buffer; `None` if the last frame did without it.
@@ -134,8 +134,4 @@ impl<'a> Session<'a> {
         // SAFETY: every `run` has waited.
         unsafe { renderer.destroy() };
     }
-}
-
-fn floats(bytes: &[u8]) -> Vec<f32> {
-    bytes.chunks_exact(4).map(|w| f32::from_ne_bytes([w[0], w[1], w[2], w[3]])).collect()
 }

@@ -205,15 +205,20 @@ impl Plan {
         self.steps.retain(|s| s.home != Home::Particles);
     }
 
-    /// Every pipeline that the frame binds, each once.
-    pub fn recipes(&self) -> Vec<&Recipe> {
-        let mut all: Vec<&Recipe> = Vec::new();
-        for call in self.steps.iter().flat_map(Step::calls) {
-            if !all.contains(&&call.recipe) {
-                all.push(&call.recipe);
+    /// Every pipeline that the frame binds, each once, with the pass that binds it first.
+    pub fn pipelines(&self) -> Vec<(&'static str, &Recipe)> {
+        let mut all: Vec<(&str, &Recipe)> = Vec::new();
+        for (pass, call) in self.steps.iter().flat_map(|step| step.calls().map(|call| (step.pass, call))) {
+            if !all.iter().any(|(_, recipe)| *recipe == &call.recipe) {
+                all.push((pass, &call.recipe));
             }
         }
         all
+    }
+
+    /// The same without their passes.
+    pub fn recipes(&self) -> Vec<&Recipe> {
+        self.pipelines().into_iter().map(|(_, recipe)| recipe).collect()
     }
 
     /// Descriptor sets that the frame allocates, and descriptors of each type in all of them.

@@ -8,9 +8,6 @@ use std::{collections::BTreeSet, path::Path};
 const FEWER_WAVES: &str = include_str!("pipelines.txt");
 const WAVES: u32 = 16;
 const FAMILY: &str = "navi31";
-/// Every published method.
-const METHODS: [&str; 2] = ["--methods", "field,imai16,imai14,cords08,green10,im16,narrow-range,curvature-flow"];
-
 /// Mesa 25's RADV, where setup.sh has found it; it compiles for hardware that is not there.
 fn radv() -> Option<String> {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/mesa25/radeon_icd.json");
@@ -53,9 +50,10 @@ fn a_gpu_that_is_not_there_is_kept_busy() {
             (shader, waves.parse().expect("a number"))
         })
         .collect();
+    let methods = meniscus::PRESETS.iter().map(|p| p.name).collect::<Vec<_>>().join(",");
     let mut found = BTreeSet::new();
     for prepare in ["cpu", "gpu", "gpu-relation"] {
-        found.extend(stages(&compiled(&manifest, &[&METHODS[..], &["--prepare", prepare]].concat())));
+        found.extend(stages(&compiled(&manifest, &["--methods", &methods, "--prepare", prepare])));
     }
     assert!(found.len() > 40, "{found:?}");
     for (name, waves, spilled) in &found {

@@ -14,7 +14,7 @@ use crate::{
 };
 use glam::Vec3;
 use meniscus::{
-    FrameInput, LedgerEntry, Settings,
+    LedgerEntry, Settings,
     host::{Gpu, Instance, Session},
     profile::{FrameTimes, PassTime},
 };
@@ -140,13 +140,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     report::refuse_validation(&device)?;
     let size = picture.rendered_size()?;
     let environment = picture.environment()?;
-    args.show(&format!(
-        "device: {} ({}); meniscus {} {}",
-        device.name,
-        device.driver,
-        env!("CARGO_PKG_VERSION"),
-        report::COMMIT
-    ))?;
+    args.show(&report::measured_on(&device))?;
     let on_device = on(&device);
     let gpu = Gpu::new(&instance, device).map_err(|e| on_device(e.into()))?;
     let mut session = Session::new(&gpu, size, &environment).map_err(|e| on_device(e.into()))?;
@@ -265,9 +259,7 @@ fn measure(
     let (camera, eye, _) = picture.camera(scene)?;
     let settings = picture.frame_settings(particles)?;
     let upload = scene.give(picture.preparer(), &settings, session)?;
-    let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
-    (input.eye_inside, input.still) = (scene.inside(eye), args.still);
-    input.positions = upload.as_ref().map(|u| scene.on_device(u));
+    let input = scene.input(&camera, &settings, eye, upload.as_ref()).still(args.still);
     let bar = progress(u64::from(args.warmup + args.frames), "frames");
     let mut frames: Vec<FrameTimes> = Vec::new();
     for i in 0..args.warmup + args.frames {

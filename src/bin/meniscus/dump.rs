@@ -209,7 +209,7 @@ pub fn frame(job: &Job) -> Value {
         "projection": rows(job.camera.projection.as_dmat4()),
         "near": job.camera.near,
         "eye": (job.eye.as_dvec3() + job.scene.origin).to_array(),
-        "eye_inside": job.eye_inside,
+        "eye_inside": job.scene.inside(job.eye),
         "origin": job.scene.origin.to_array(),
         "radius": radius,
         "environment_rotation": job.camera.environment_rotation,

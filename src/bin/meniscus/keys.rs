@@ -185,9 +185,8 @@ fn between(points: &[&Point], time: f64) -> Option<Value> {
         let own = (vb - va) / width;
         let ta = before.filter(|_| a.ease == Ease::Smooth).and_then(|p| slope(p, a)).map_or(0.0, |u| mean(u, own));
         let tb = after.filter(|q| q.ease == Ease::Smooth).and_then(|q| slope(b, q)).map_or(0.0, |v| mean(own, v));
-        let (s2, s3) = (s * s, s * s * s);
-        let blend = (2.0 * s3 - 3.0 * s2 + 1.0) * va + (3.0 * s2 - 2.0 * s3) * vb;
-        Some(blend + width * ((s3 - 2.0 * s2 + s) * ta + (s3 - s2) * tb))
+        let [a, b, da, db] = hermite(s);
+        Some(a * va + b * vb + width * (da * ta + db * tb))
     };
     match (&a.value, &b.value) {
         (Value::Array(x), Value::Array(y)) if x.len() == y.len() => {
@@ -196,6 +195,12 @@ fn between(points: &[&Point], time: f64) -> Option<Value> {
         }
         _ => one(&number).map(Value::Float),
     }
+}
+
+/// Hermite's cubic at 0 to 1 of its way: what its two ends weigh, and the slopes there times its width.
+pub fn hermite(s: f64) -> [f64; 4] {
+    let (s2, s3) = (s * s, s * s * s);
+    [2.0 * s3 - 3.0 * s2 + 1.0, 3.0 * s2 - 2.0 * s3, s3 - 2.0 * s2 + s, s3 - s2]
 }
 
 fn number(value: &Value) -> Option<f64> {

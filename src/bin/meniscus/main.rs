@@ -38,7 +38,7 @@ mod tune;
 mod view;
 
 use clap::{Parser, Subcommand, error::ContextValue};
-use meniscus::host::{DeviceInfo, HostError};
+use meniscus::host::{DeviceInfo, HostError, Instance};
 use std::{error::Error, process::ExitCode};
 use terminal::NotWritten;
 
@@ -138,6 +138,13 @@ fn on(device: &DeviceInfo) -> impl Fn(Box<dyn Error>) -> Box<dyn Error> + use<> 
         ) => format!("{name}: {e}").into(),
         _ => e,
     }
+}
+
+/// Shows what validation had to say, and how the program ends because of it.
+fn validated(instance: &Instance) -> ExitCode {
+    let messages = instance.messages();
+    messages.iter().for_each(|m| terminal::complain(format!("validation: {m}")));
+    if messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(4) }
 }
 
 /// Shows what clap has to say: help, or what was wrong with the command line.

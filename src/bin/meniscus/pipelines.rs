@@ -51,13 +51,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     }
     let instance = Instance::new(false)?;
     let device = instance.pick(args.options.device.as_deref())?;
-    line(format!(
-        "device: {} ({}); meniscus {} {}",
-        device.name,
-        device.driver,
-        env!("CARGO_PKG_VERSION"),
-        report::COMMIT
-    ))?;
+    line(report::measured_on(&device))?;
     let on_device = on(&device);
     let gpu = Gpu::telling(&instance, device).map_err(|e| on_device(e.into()))?;
     let mut methods = Vec::new();

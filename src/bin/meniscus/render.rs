@@ -7,11 +7,11 @@ use crate::{
     picture::Picture,
     prepared::{self, Prepared},
     scene::{Prepare, Scene, spinner},
-    scene_file, stats, terminal,
+    scene_file, stats, terminal, validated,
 };
 use glam::Vec3;
 use meniscus::{
-    Camera, FrameInput, Particles, Settings,
+    Camera, Particles, Settings,
     host::{Gpu, Instance, Session},
     inspect::Inspection,
     io::images,
@@ -85,7 +85,6 @@ pub struct Job<'a> {
     pub settings: Settings,
     /// Size rendered at.
     pub size: [u32; 2],
-    pub eye_inside: bool,
 }
 
 impl Job<'_> {
@@ -121,12 +120,9 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     if let Some(why) = drawn.map_err(on_device)? {
         terminal::complain(format!("meniscus: {why}"));
     }
-    let messages = instance.messages();
-    for m in &messages {
-        terminal::complain(format!("validation: {m}"));
-    }
+    let code = validated(&instance);
     terminal::progress(format!("wrote {}", args.output.display()));
-    Ok(if messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(4) })
+    Ok(code)
 }
 
 fn announce(scene: &Scene, device: &str, driver: &str) {
@@ -150,17 +146,14 @@ fn plan<'a>(args: &'a Args, picture: Picture, scene: &'a Scene) -> Result<Job<'a
     let settings = picture.frame_settings(&scene.particles)?;
     let size = picture.rendered_size()?;
     let picture = picture.settled(scene)?;
-    Ok(Job { args, picture, scene, prepared: None, camera, eye, settings, size, eye_inside: scene.inside(eye) })
+    Ok(Job { args, picture, scene, prepared: None, camera, eye, settings, size })
 }
 
 /// Renders and writes everything; says so if the picture shows none of the liquid.
 fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dyn std::error::Error>> {
     let upload = job.scene.give(job.picture.preparer(), &job.settings, session)?;
     let (camera, settings) = (job.camera, job.settings);
-    // The session has a canvas of its own.
-    let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
-    input.eye_inside = job.eye_inside;
-    input.positions = upload.as_ref().map(|u| job.scene.on_device(u));
+    let input = job.scene.input(&camera, &settings, job.eye, upload.as_ref());
     let mut times = session.frame(&input)?;
     if job.args.stats.is_some() {
         // The first frame compiles shaders; the second is timed.

@@ -13,6 +13,11 @@ use std::{error::Error, path::Path};
 /// Commit this was built from.
 pub const COMMIT: &str = env!("MENISCUS_COMMIT");
 
+/// What figures are of: device, driver, and what was built from which commit.
+pub fn measured_on(device: &DeviceInfo) -> String {
+    format!("device: {} ({}); meniscus {} {COMMIT}", device.name, device.driver, env!("CARGO_PKG_VERSION"))
+}
+
 fn extension(path: &Path) -> Option<&str> {
     path.extension().and_then(|e| e.to_str())
 }

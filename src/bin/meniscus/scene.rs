@@ -5,7 +5,8 @@ use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
-    Class, Ellipsoid, Particles, Point, Renderer, Settings,
+    Camera, Class, Ellipsoid, FrameInput, Particles, Point, Renderer, Settings,
+    ash::vk::ImageView,
     host::{Session, Upload},
     io::particles::{Invalid, ParticleFile, ReadError, check_finite, read_bytes, read_within},
     layers::Layers,
@@ -218,6 +219,21 @@ impl Scene {
         let mut all = DevicePositions::packed(upload.buffer, self.positions.len() as u32, self.particles.radius);
         all.options = self.options;
         all
+    }
+
+    /// A frame of it, of what [`Scene::give`] uploaded, from an eye relative to the origin; into a session, which has an output of
+    /// its own.
+    pub fn input<'a>(
+        &self,
+        camera: &'a Camera,
+        settings: &'a Settings,
+        eye: Vec3,
+        upload: Option<&Upload>,
+    ) -> FrameInput<'a> {
+        let mut input = FrameInput::new(0, camera, settings, ImageView::null());
+        input.eye_inside = self.inside(eye);
+        input.positions = upload.map(|u| self.on_device(u));
+        input
     }
 
     /// Whether a point (relative to the origin) is inside the body: half as dense as a filled body.

@@ -17,13 +17,12 @@ use crate::{
     options::Options,
     outputs,
     scene::{self, Scene},
-    terminal,
+    terminal, validated,
 };
 use ahead::Ready;
 use film::Kind;
 use frames::Selection;
 use meniscus::{
-    FrameInput,
     host::{Gpu, Instance, Session},
     inspect,
 };
@@ -128,17 +127,14 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
         done
     })()
     .map_err(on_device)?;
-    let messages = instance.messages();
-    for m in &messages {
-        terminal::complain(format!("validation: {m}"));
-    }
+    let code = validated(&instance);
     let made = to_do - failed;
     let rate = made as f64 / begin.elapsed().as_secs_f64();
     terminal::progress(format!("wrote {made} pictures, {rate:.2} a second: {}", plan.names()));
     if failed > 0 {
         return Err(LeftOut { failed, all }.into());
     }
-    Ok(if messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(4) })
+    Ok(code)
 }
 
 /// Makes what is not there; says how many pictures could not be made.
@@ -245,10 +241,7 @@ fn draw(
     let (camera, eye, _) = picture.camera(scene)?;
     let settings = picture.frame_settings(&scene.particles)?;
     let upload = scene.give(picture.preparer(), &settings, session)?;
-    let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
-    input.eye_inside = scene.inside(eye);
-    input.positions = upload.as_ref().map(|u| scene.on_device(u));
-    let times = session.frame(&input)?;
+    let times = session.frame(&scene.input(&camera, &settings, eye, upload.as_ref()))?;
     row.note = empty::explain(session, &scene.particles, &camera, &settings, picture.rendered_size()?)?;
     row.frame_ms += ms_since(begin);
     if args.stats.is_some() {

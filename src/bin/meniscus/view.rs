@@ -15,7 +15,7 @@ mod text;
 mod viewer;
 mod written;
 
-use crate::{choices, on, options::Options, scene::Prepare, terminal};
+use crate::{choices, on, options::Options, scene::Prepare, terminal, validated};
 use error::ViewError;
 use events::{Events, Opener};
 use frames::Frames;
@@ -87,11 +87,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let shown = show(&mut event_loop, &instance, device.clone(), &window, &surface, (start, environment, player));
     drop(surface);
     shown.map_err(on(&device))?;
-    let messages = instance.messages();
-    for m in &messages {
-        terminal::complain(format!("validation: {m}"));
-    }
-    Ok(if messages.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(4) })
+    Ok(validated(&instance))
 }
 
 /// A window of this size, if the display gives it.

@@ -80,9 +80,7 @@ pub fn all(
                 upload = job.scene.give(job.picture.preparer(), &settings, session)?;
                 given = Some(of_points(&settings));
             }
-            let mut input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null());
-            input.eye_inside = job.scene.inside(eye);
-            input.positions = upload.as_ref().map(|u| job.scene.on_device(u));
+            let input = job.scene.input(&camera, &settings, eye, upload.as_ref());
             let mut frames: Vec<FrameTimes> = Vec::new();
             for i in 0..WARM_UP + job.frames {
                 let times = session.frame(&input)?.ok_or("this device has no timestamps: nothing can be measured")?;

@@ -4,6 +4,7 @@ use super::{
     Args,
     frames::{Frame, Frames},
 };
+use crate::keys::hermite;
 use glam::DVec3;
 use meniscus::io::particles::ParticleFile;
 use std::path::PathBuf;
@@ -109,10 +110,9 @@ pub fn between(
     let none = Vec::new();
     let (va, vb) = (a.velocities.as_ref().unwrap_or(&none), b.velocities.as_ref().unwrap_or(&none));
     let (s, dt) = (moment.toward, moment.interval);
-    let (s2, s3) = (s * s, s * s * s);
+    let [start, end, leaving, arriving] = hermite(s);
     let along = |i: usize| -> DVec3 {
-        let ends = (2.0 * s3 - 3.0 * s2 + 1.0) * a.positions[i] + (3.0 * s2 - 2.0 * s3) * b.positions[i];
-        ends + dt * ((s3 - 2.0 * s2 + s) * va[i] + (s3 - s2) * vb[i])
+        start * a.positions[i] + end * b.positions[i] + dt * (leaving * va[i] + arriving * vb[i])
     };
     let nearer = if s < 0.5 { a } else { b };
     Ok(ParticleFile {

@@ -165,10 +165,7 @@ impl<'a> Pane<'a> {
     /// Its pixels as a picture is written from them, once frames are over.
     pub fn pixels(&self, supersample: u32) -> Result<Vec<[f32; 3]>, HostError> {
         let Some(canvas) = &self.canvas else { return Ok(Vec::new()) };
-        let bytes = canvas.read()?;
-        let float = |at: &[u8]| f32::from_ne_bytes([at[0], at[1], at[2], at[3]]);
-        let all = bytes.chunks_exact(16).map(|p| [float(p), float(&p[4..]), float(&p[8..])]);
-        Ok(average(&all.collect::<Vec<_>>(), canvas.size(), supersample))
+        Ok(average(&canvas.picture()?, canvas.size(), supersample))
     }
 }
 
