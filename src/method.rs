@@ -50,7 +50,7 @@ impl Offers {
         "the liquid's thickness",
         "surfaces at half the picture's resolution",
         "the particles' speeds",
-        "surfaces that the view does not show (for trace_reflections above 0)",
+        "surfaces that the view does not show (for many, and for trace_reflections above 0)",
     ];
 
     fn all(self) -> [bool; 7] {

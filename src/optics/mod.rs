@@ -5,6 +5,7 @@ mod field_walk;
 pub mod four;
 pub mod instant_liquids;
 pub(crate) mod lookup;
+pub mod many;
 pub mod one;
 pub mod ssfr;
 pub mod ssfr_index;
@@ -25,6 +26,7 @@ family! {
     /// How light goes through the liquid's surfaces.
     pub enum Optics: Shading {
         Four(four) = "four",
+        Many(many) = "many",
         Two(two) = "two",
         One(one) = "one",
         Ssfr(ssfr) = "ssfr",

@@ -16,10 +16,11 @@ use ash::vk::Format;
 
 /// The parameters of walks that follow light inside the liquid.
 macro_rules! walk_parameters {
-    ($(#[doc = $about:literal])+ pub struct $Name:ident) => {
+    ($(#[doc = $about:literal])+ pub struct $Name:ident $({ $($own:tt)* })?) => {
         parameters! {
             $(#[doc = $about])+
             pub struct $Name {
+                $($($own)*)?
                 /// Total internal reflections followed in one walk; ours: the papers follow none
                 internal_reflections: u32 = 4, "", "0 to 64" => |n| *n <= 64;
                 /// Reflectance (Imai16: Schlick's)
@@ -36,7 +37,7 @@ pub(super) use walk_parameters;
 /// What a walk is told: the members of [`super::Optics`] that follow rays are such.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walk {
-    /// Surfaces at which light bends: 1, 2 or 4.
+    /// Surfaces at which light bends: 1, or two for each volume of liquid.
     pub refractions: u32,
     /// Total internal reflections followed.
     pub internal_reflections: u32,
@@ -52,6 +53,7 @@ impl Walk {
         use super::Optics;
         match *optics {
             Optics::Four(p) => Some(p.into()),
+            Optics::Many(p) => Some(p.into()),
             Optics::Two(p) => Some(p.into()),
             Optics::One(p) => Some(p.into()),
             _ => None,

@@ -170,6 +170,7 @@ fn rays_are_walked_as_the_twin_walks_them() {
             (Field::default(), 4, 4),
             (Field::default().spacing(1.5).kernel_radius(4.0), 2, 1),
             (Field::default(), 4, 0),
+            (Field::default(), 12, 4),
             (Field::default(), 1, 0),
         ] {
             let mut case = case(field, refractions, reflections);

@@ -53,6 +53,7 @@ const NEEDS: &[Need] = &[
     ("plane-fit", "the particles' own normals", &["split", "front"]),
     ("four", "the far side of the liquid", &["split", "nearest-farthest"]),
     ("two", "the far side of the liquid", &["split", "nearest-farthest"]),
+    ("many", "surfaces that the view does not show", &[]),
     ("ssfr", "the liquid's thickness", &["front"]),
     ("ssfr-index", "the liquid's thickness", &["front"]),
 ];

@@ -7,7 +7,7 @@ use meniscus::{
     host::{Gpu, Instance, Session, Upload},
     inspect::{self, Inspection, Walk},
     layers::Layers,
-    optics::{Optics, four::Four, one::One, two::Two},
+    optics::{Optics, four::Four, many::Many, one::One, two::Two},
     prepare::{self, DeviceIds, DevicePositions},
     shader::Frame,
     smooth::{Smooth, plane_fit::PlaneFit},
@@ -266,7 +266,12 @@ impl Choose for Settings {
         let optics = match count {
             4 => Four::default().internal_reflections(walk.internal_reflections).fresnel(walk.fresnel).into(),
             2 => Two::default().internal_reflections(walk.internal_reflections).fresnel(walk.fresnel).into(),
-            _ => One::default().fresnel(walk.fresnel).into(),
+            1 => One::default().fresnel(walk.fresnel).into(),
+            _ => Many::default()
+                .volumes(count / 2)
+                .internal_reflections(walk.internal_reflections)
+                .fresnel(walk.fresnel)
+                .into(),
         };
         with(self, |s| s.method.optics = optics)
     }
@@ -275,6 +280,7 @@ impl Choose for Settings {
         let change = |optics: &mut Optics| match optics {
             Optics::Four(p) => p.internal_reflections = count,
             Optics::Two(p) => p.internal_reflections = count,
+            Optics::Many(p) => p.internal_reflections = count,
             _ => {}
         };
         with(self, |s| change(&mut s.method.optics))

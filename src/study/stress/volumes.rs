@@ -4,6 +4,7 @@ use super::{
     Case, Measure, NO_NUMBER, Step, clouds, median,
     shot::{View, apart},
 };
+use crate::optics::many::Many;
 use glam::{DVec3, Vec3};
 
 /// Half the thickness of a slab, and from one slab's middle to the next's, in radii.
@@ -15,8 +16,8 @@ pub const INTERFACES: Case = Case {
     name: "interfaces",
     about: "slabs in a row, 8 radii thick and 16 apart; at odd numbers of interfaces the eye is in the first",
     x: "interfaces in a row",
-    // Two volumes are all that screen-space maps know.
-    promised: &[],
+    // Two volumes are all that screen-space maps know; what knows more is asked for more.
+    promised: &["field"],
     measures: &[
         NO_NUMBER,
         Measure {
@@ -37,6 +38,9 @@ pub const INTERFACES: Case = Case {
             let eye = DVec3::new(0.5, 0.3, if inside { 0.0 } else { 60.0 });
             let mut view = View::new(eye, eye - DVec3::Z, DVec3::Y, if inside { 30.0 } else { 10.0 });
             view.eye_inside = inside;
+            let mut many = *settings;
+            many.method.optics = Many::default().volumes(slabs as u32).into();
+            let settings = if slabs > 2 && many.method.validate().is_ok() { &many } else { settings };
             let shot = rig.shoot(&cloud, 1.0, &view, settings)?;
             let ior = f64::from(settings.liquid.ior);
             let mut off = Vec::new();

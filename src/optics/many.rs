@@ -1,0 +1,32 @@
+//! Light bends at as many surfaces as there are.
+
+use super::{
+    Fresnel, Shading,
+    walk::{Walk, walk_parameters},
+};
+use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::parameters, plan::Plan};
+
+walk_parameters! {
+    /// Refractions through many volumes of liquid, in a density field alone: maps of depths know two.
+    pub struct Many {
+        /// Volumes of liquid that a ray goes through at most; it is refracted twice in each
+        volumes: u32 = 8, "", "1 to 32" => |n| (1..=32).contains(n);
+    }
+}
+
+impl Shading for Many {
+    fn asks(&self) -> Offers {
+        Offers { beyond: true, ..Offers::default() }
+    }
+
+    fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
+        Walk::from(*self).record(plan, scene, surfaces);
+    }
+}
+
+impl From<Many> for Walk {
+    fn from(p: Many) -> Walk {
+        let Many { volumes, internal_reflections, fresnel, trace_reflections } = p;
+        Walk { refractions: 2 * volumes, internal_reflections, fresnel, trace_reflections }
+    }
+}
