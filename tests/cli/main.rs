@@ -18,6 +18,7 @@ mod signals;
 mod stress;
 #[cfg(feature = "study")]
 mod study;
+mod submit;
 mod terminal;
 #[cfg(feature = "study")]
 mod tune;

@@ -35,7 +35,7 @@ fn the_default_keeps_its_promises_beside_rivals() {
     assert!(["stress.csv", "stress.json", "stress.md"].iter().all(|f| files.iter().any(|g| g == f)), "{files:?}");
     assert!(files.iter().filter(|f| f.ends_with(".svg")).count() > 10, "{files:?}");
     let table = fs::read_to_string(run.path("out/stress.md")).expect("the table");
-    assert!(table.contains("| field | imai16 | green10 |") && table.contains("- interfaces, imai16: "), "{table}");
+    assert!(table.contains("| field  | imai16 | green10 |") && table.contains("- interfaces, imai16: "), "{table}");
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod info;
 mod keys;
 mod options;
 mod outputs;
+mod part;
 mod picture;
 mod pipelines;
 mod prepared;
@@ -28,6 +29,7 @@ mod sequence;
 mod stats;
 #[cfg(feature = "study")]
 mod stress;
+mod submit;
 mod temporary;
 mod terminal;
 #[cfg(feature = "study")]
@@ -76,6 +78,8 @@ enum Command {
     /// Find the cheapest settings within an error, or the best within a time, and write them as a scene file
     #[cfg(feature = "study")]
     Tune(Box<tune::Args>),
+    /// Write, and hand to a scheduler, what makes a sequence in parts at once: Slurm, HyperQueue, OpenJD
+    Submit(Box<submit::Args>),
     /// Show particles in a window: fly around them, play a sequence, change method and parameters, two methods side by side
     #[cfg(feature = "view")]
     View(Box<view::Args>),
@@ -122,6 +126,7 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),
         Command::Pipelines(args) => pipelines::run(&args),
+        Command::Submit(args) => submit::run(&args),
         Command::Info => info::run(),
     }
 }

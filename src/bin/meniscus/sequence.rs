@@ -16,6 +16,7 @@ use crate::{
     empty, on,
     options::Options,
     outputs,
+    part::Part,
     scene::{self, Scene},
     terminal, validated,
 };
@@ -52,6 +53,10 @@ pub struct Args {
     /// Only these numbers, such as 10-250 or 10-250:2
     #[arg(long, value_name = "A-B[:STEP]", allow_hyphen_values = true)]
     pub frames: Option<Selection>,
+    /// Only the K-th of N parts of these pictures, such as 0/10 to 9/10: parts can be made by several programs at once. Films are left
+    /// to a run without this, which makes what is not there; rows of --stats go to a file of the part's own, and that run joins them
+    #[arg(long, value_name = "K/N")]
+    pub part: Option<Part>,
     /// The eye goes so many degrees around the target over the sequence: 360 is once around, and the end meets the start
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     pub turn: Option<f64>,
@@ -99,11 +104,13 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let all = plan.shots.len();
     let to_do = plan.shots.iter().filter(|s| !s.kept).count();
     if to_do == 0 {
-        if plan.films.is_empty() {
+        if all == 0 {
+            terminal::progress("nothing to do: there are more parts than pictures");
+        } else if plan.films.is_empty() && !plan.stats.as_deref().is_some_and(table::has_parts) {
             terminal::progress(format!("nothing to do: all {all} pictures are there, {}", plan.names()));
         } else {
             make(args, &plan, None)?;
-            terminal::progress(format!("all {all} pictures are there; wrote {}", plan.names()));
+            terminal::progress(format!("all {all} pictures are there: {}", plan.names()));
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -274,4 +281,17 @@ fn check(args: &Args, pictures: &[PathBuf], inputs: &[outputs::Named]) -> Result
     outputs::check(&named, None, inputs)?;
     named.extend(inputs);
     Ok(outputs::check_pictures(pictures, &named)?)
+}
+
+/// How much there is to make.
+pub struct Pictures {
+    pub count: usize,
+    /// Outputs that are numbered pictures.
+    pub patterns: usize,
+}
+
+pub fn pictures(args: &Args) -> Result<Pictures, Box<dyn Error>> {
+    let plan = Plan::new(args)?;
+    let patterns = args.output.iter().filter(|p| Kind::of(p).is_none()).count();
+    Ok(Pictures { count: plan.shots.len(), patterns })
 }

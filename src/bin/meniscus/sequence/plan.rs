@@ -6,7 +6,7 @@ use super::{
     check,
     film::Kind,
     frames::{Frames, FramesError, Pattern},
-    kept,
+    kept, table,
 };
 use crate::{outputs, picture::Picture, scene::Prepare};
 use glam::{DVec3, Vec3};
@@ -41,6 +41,8 @@ pub struct Plan {
     pub shots: Vec<Shot>,
     /// Made anew, of all pictures.
     pub films: Vec<(PathBuf, Kind)>,
+    /// Where rows go.
+    pub stats: Option<PathBuf>,
 }
 
 /// What was left to the scene, as the first frame decides it, so that it is the same in all: nothing jumps, and a sequence
@@ -100,6 +102,9 @@ impl Plan {
         };
         let frames = Frames::find(inputs)?;
         let patterns = patterns(args)?;
+        if args.part.is_some() && patterns.is_empty() {
+            return Err("parts of a film are numbered pictures: name them too, such as --output 'out/####.png'".into());
+        }
         let times = Times::new(args, &frames);
         let pictures = times.pictures();
         let numbers: Vec<_> = pictures.iter().map(|p| p.0).collect();
@@ -121,7 +126,8 @@ impl Plan {
         // All of it over all pictures: a film that begins anew goes on turning.
         let turn = args.turn.unwrap_or(0.0) / pictures.len() as f64;
         let mut shots = Vec::new();
-        for (number, exposed) in pictures.iter().filter(|p| wanted(&p.0)) {
+        let made: Vec<_> = pictures.iter().filter(|p| wanted(&p.0)).collect();
+        for (number, exposed) in &made[args.part.map_or(0..made.len(), |part| part.range(made.len()))] {
             let expose = |time: &f64| -> Result<_, Box<dyn Error>> {
                 let mut picture = at(*time)?;
                 picture.particles = None;
@@ -138,8 +144,11 @@ impl Plan {
         let size = picture.size;
         let finished = |s: &Shot| !s.files.is_empty() && s.files.iter().all(|f| kept::finished(f, &s.label, size));
         shots.par_iter_mut().for_each(|s| s.kept = finished(s));
-        let films = args.output.iter().filter_map(|p| Some((p.clone(), Kind::of(p)?))).collect();
-        Ok(Plan { frames, between: args.step.is_some(), shots, films })
+        let mut films: Vec<_> = args.output.iter().filter_map(|p| Some((p.clone(), Kind::of(p)?))).collect();
+        if args.part.is_some() {
+            films.clear();
+        }
+        Ok(Plan { frames, between: args.step.is_some(), shots, films, stats: table::path(args) })
     }
 
     /// The first picture's name, and the last one's; and films.

@@ -1,17 +1,19 @@
 //! `--stats`: a row for each picture.
 
 use super::{
+    Args,
     ahead::Ready,
     plan::{Plan, Shot},
 };
 use crate::{
     outputs::{self, OutputError},
+    part::Part,
     scene::Scene,
 };
 use meniscus::prepare::Report;
 use std::{
     collections::BTreeMap,
-    path::Path,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
@@ -71,7 +73,7 @@ impl Row {
         let mut cells = vec![self.number.to_string(), file];
         cells.extend(counts.into_iter().chain(times));
         cells.extend([self.gpu_ms.map_or(String::new(), ms), ms(self.encode_ms)]);
-        cells.push(self.change.map_or(String::new(), |c| format!("{c:.6}")));
+        cells.push(change_cell(self.change));
         cells
     }
 }
@@ -88,8 +90,27 @@ pub struct Table<'a> {
 impl<'a> Table<'a> {
     pub fn new(path: &'a Path, plan: &'a Plan) -> Table<'a> {
         let mut rows = older(path).unwrap_or_default();
+        // And those of parts, where this joins them.
+        for part in parts_of(path) {
+            older(&part)
+                .unwrap_or_default()
+                .into_iter()
+                .for_each(|(number, row)| _ = rows.entry(number).or_insert(row));
+        }
         rows.retain(|number, _| plan.shots.iter().any(|s| s.kept && s.number == *number));
         Table { path, plan, rows, due: Instant::now() }
+    }
+
+    /// Whether the row of a picture that is there does not say what has changed since the one before: a part's first.
+    pub fn lacks_change(&self, shot: &Shot) -> bool {
+        self.rows.get(&shot.number).and_then(|row| row.last()).is_some_and(String::is_empty)
+    }
+
+    /// Says so now.
+    pub fn set_change(&mut self, shot: &Shot, change: Option<f64>) {
+        if let Some(cell) = self.rows.get_mut(&shot.number).and_then(|row| row.last_mut()) {
+            *cell = change_cell(change);
+        }
     }
 
     pub fn add(&mut self, row: Row) -> Result<(), OutputError> {
@@ -114,6 +135,36 @@ impl<'a> Table<'a> {
         }
         outputs::write(self.path, &writer.into_inner().expect("written to memory"))
     }
+}
+
+fn change_cell(change: Option<f64>) -> String {
+    change.map_or(String::new(), |c| format!("{c:.6}"))
+}
+
+/// Where rows go: those of a part to a file of its own.
+pub fn path(args: &Args) -> Option<PathBuf> {
+    let path = args.stats.as_deref()?;
+    let name = |part: Part| beside(path, &part.name());
+    Some(args.part.map_or_else(|| path.to_owned(), name))
+}
+
+/// stats.csv, stats.part-0-of-3.csv
+fn beside(path: &Path, part: &str) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}.{part}.csv"))
+}
+
+/// The tables of parts beside this one.
+fn parts_of(path: &Path) -> Vec<PathBuf> {
+    let folder = glob::Pattern::escape(&path.parent().unwrap_or(Path::new("")).to_string_lossy());
+    let stem = glob::Pattern::escape(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let pattern = Path::new(&folder).join(format!("{stem}.part-*-of-*.csv"));
+    glob::glob(&pattern.to_string_lossy()).map_or_else(|_| Vec::new(), |found| found.flatten().collect())
+}
+
+/// Whether there are tables of parts to join.
+pub fn has_parts(path: &Path) -> bool {
+    !parts_of(path).is_empty()
 }
 
 /// The rows of a table that was written before; nothing if it is none.

@@ -53,7 +53,7 @@ pub fn bar(length: usize) -> ProgressBar {
 
 impl<'a> Writer<'a> {
     pub fn new(args: &'a Args, plan: &'a Plan, bar: &'a ProgressBar) -> Result<Self, Failure> {
-        let table = args.stats.as_deref().map(|path| Table::new(path, plan));
+        let table = plan.stats.as_deref().map(|path| Table::new(path, plan));
         let size = plan.shots[0].exposures[0].picture.size;
         let format = Format { size, rate: args.fps, frames: plan.shots.len() };
         let films = plan.films.iter().map(|(path, kind)| Film::new(path, *kind, format)).collect::<Result<_, _>>()?;
@@ -94,15 +94,20 @@ impl<'a> Writer<'a> {
 
     /// One that is there: needed by what compares it with the next, and by films.
     fn keep(&mut self, index: usize) -> Result<(), Failure> {
-        let next = self.plan.shots.get(index + 1);
-        let compared = self.table.is_some() && next.is_some_and(|next| !next.kept);
-        self.last = None;
+        let (shot, next) = (&self.plan.shots[index], self.plan.shots.get(index + 1));
+        let lacks = |table: &Table, shot| table.lacks_change(shot) && shot.number > self.plan.shots[0].number;
+        let this = self.table.as_ref().is_some_and(|table| lacks(table, shot));
+        let following = |table: &Table| next.is_some_and(|next| !next.kept || lacks(table, next));
+        let compared = this || self.table.as_ref().is_some_and(following);
+        let last = self.last.take();
         if compared || !self.films.is_empty() {
-            let shot = &self.plan.shots[index];
             let picture = &shot.exposures[0].picture;
             let file = shot.files.first().ok_or("a picture that is there has no name; report this")?;
             let bytes = srgb_bytes(&read_picture(file, &picture.max_memory)?.1);
             self.film(&bytes)?;
+            if let Some(table) = self.table.as_mut().filter(|_| this) {
+                table.set_change(shot, last.and_then(|last| change(&last, &bytes)));
+            }
             self.last = Some(bytes);
         }
         Ok(())
