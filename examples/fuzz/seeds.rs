@@ -7,15 +7,13 @@ use exr::prelude as ex;
 use exr::prelude::WritableImage as _;
 use npyz::zip::CompressionMethod::{Deflated, Stored};
 
-use super::pack;
+use super::pack::{self, Pack};
 
 /// A file's content before it is packed, and how that is done.
 pub struct Seed {
     pub bytes: Vec<u8>,
     pack: Pack,
 }
-
-type Pack = fn(&[u8]) -> Vec<u8>;
 
 impl Seed {
     pub fn pack(&self, bytes: &[u8]) -> Vec<u8> {
@@ -119,8 +117,15 @@ pub fn of(format: &str) -> Vec<Seed> {
     }
     if matches!(format, "vtu" | "vtp") {
         let data = [&36_u32.to_le_bytes()[..], &packed(f32::to_le_bytes)].concat();
-        seeds.push(Seed { bytes: data, pack: |data| pack::vtu(data, false) });
-        seeds.push(Seed { bytes: packed(f32::to_le_bytes), pack: |data| pack::vtu(data, true) });
+        seeds.push(Seed { bytes: data, pack: |data| pack::vtu(data, None) });
+        let packs: [Pack; 4] = [
+            |data| pack::vtu(data, Some(("vtkZLibDataCompressor", pack::zlib))),
+            |data| pack::vtu(data, Some(("vtkLZ4DataCompressor", pack::lz4))),
+            |data| pack::vtu(data, Some(("vtkLZMADataCompressor", pack::xz))),
+            // Mutated after it was packed.
+            |data| pack::vtu(data, Some(("vtkLZ4DataCompressor", |data| data.to_vec()))),
+        ];
+        seeds.extend(packs.map(|pack| Seed { bytes: packed(f32::to_le_bytes), pack }));
     }
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
     let mut kept: Vec<_> =

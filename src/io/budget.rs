@@ -151,6 +151,11 @@ impl Ledger {
         self.add(&self.held, bytes, self.budget.allowance(self.file), what)
     }
 
+    /// Bytes that may be held beside those that are.
+    pub(crate) fn left(&self) -> u64 {
+        self.budget.allowance(self.file).saturating_sub(self.held.get())
+    }
+
     /// Notes bytes that were decompressed and are not kept.
     pub(crate) fn unpack(&self, bytes: u64, what: &str) -> Result<(), OverBudget> {
         let most = self.budget.uncapped(self.file).saturating_mul(UNPACKED);

@@ -17,6 +17,7 @@ mod text;
 mod vtk;
 mod vtk_sections;
 mod vtk_xml;
+mod vtk_xml_blocks;
 mod vtk_xml_data;
 mod xyz;
 
@@ -34,7 +35,7 @@ use source::Source;
 /// The known extensions, lower case and without dot, each with what is read from it.
 pub const FORMATS: &[(&str, &str)] = &[
     ("vtk", "legacy VTK, ASCII or binary: any data set with POINTS; point arrays `class`, `velocity` (or `v`, `U`)"),
-    ("vtu", "VTK XML unstructured grid, inline or appended, plain or zlib; point arrays as .vtk"),
+    ("vtu", "VTK XML unstructured grid, inline or appended, plain, zlib, LZ4 or LZMA; point arrays as .vtk"),
     ("vtp", "VTK XML poly data, as .vtu"),
     ("ply", "PLY, ASCII or binary: element `vertex` with x, y, z; properties `class`, vx, vy, vz"),
     ("bgeo", "Houdini/Partio BGEO version 5, plain or gzip; attributes `class`, `v` (or `velocity`)"),

@@ -20,3 +20,5 @@ mod twin_plane_fit;
 mod twin_walk;
 #[cfg(feature = "io")]
 mod velocities;
+#[cfg(feature = "io")]
+mod vtk_xml;

@@ -48,6 +48,14 @@ impl Source<'_> {
         ReadError::TooLarge { path: self.path.into(), source }
     }
 
+    /// For what asks for more than is left without saying how much.
+    pub(super) fn no_room(&self, what: &str) -> ReadError {
+        match self.ledger.hold_all(self.ledger.left() + 1, 1, what) {
+            Err(over) => self.too_large(over),
+            Ok(()) => self.malformed(At::Unknown, format!("{what} takes more memory than there can be")),
+        }
+    }
+
     pub(super) fn no_positions(&self, wanted: &'static str, found: impl AsRef<str>) -> ReadError {
         ReadError::NoPositions { path: self.path.into(), wanted, found: quote::cut(found.as_ref(), DETAIL) }
     }
