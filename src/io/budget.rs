@@ -142,6 +142,11 @@ impl Ledger {
         Ok(ledger)
     }
 
+    /// What is made of several files, which are not held at once.
+    pub(crate) fn of_parts(budget: Budget, files: u64) -> Ledger {
+        Ledger { budget, file: files, held: Cell::new(0), unpacked: Cell::new(0) }
+    }
+
     /// Asks for room for `count` values of `each` bytes. Nothing is given back: what is freed early is not worth the books.
     pub(crate) fn hold_all(&self, count: u64, each: usize, what: &str) -> Result<(), OverBudget> {
         self.hold(count.saturating_mul(each as u64), what)

@@ -23,7 +23,7 @@ fn what_vtk_compresses() {
     }
 }
 
-const POINTS: usize = 4096;
+const POINTS: usize = 8192;
 
 /// Values that pack well.
 fn values() -> Vec<f32> {

@@ -29,6 +29,7 @@ const PART: usize = 1 << 16;
 /// Reads an array N x 3.
 pub(super) fn read_npy(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let mut rest = source.bytes;
+    source.note(|notes| notes.format = "NumPy array".into());
     let positions = Array::open(source, "array", &mut rest)?.positions(source)?;
     if !rest.is_empty() {
         let at = At::Byte((source.bytes.len() - rest.len()) as u64);
@@ -40,6 +41,7 @@ pub(super) fn read_npy(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
 /// Reads the arrays this crate knows of an archive, compressed or not.
 pub(super) fn read_npz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let (mut archive, names) = open(source)?;
+    source.note(|notes| notes.format = "NumPy archive".into());
     let Some(position) = POSITIONS.iter().find(|name| names.iter().any(|known| known == *name)) else {
         let found = format!("arrays {}", list(names.iter().map(String::as_str)));
         return Err(source.no_positions("an array named `position` or `points` expected", found));
@@ -53,7 +55,8 @@ pub(super) fn read_npz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let classes = entry(source, &mut archive, &names, "class", |array| array.classes(source))?;
     let velocities = entry(source, &mut archive, &names, "velocity", |array| array.positions(source))?;
     let axes = entry(source, &mut archive, &names, "axes", |array| array.axes(source))?;
-    Ok(ParticleFile { positions, radius, support, classes, velocities, axes })
+    let ids = entry(source, &mut archive, &names, "id", |array| array.ids(source))?.flatten();
+    Ok(ParticleFile { positions, radius, support, classes, velocities, ids, axes })
 }
 
 /// The shape and the values of one array, which is in C order.
@@ -106,6 +109,9 @@ fn entry<T>(
     let what = format!("array `{name}`");
     let entry = archive.zip_archive().by_name(&format!("{name}.npy"));
     let inner = entry.map_err(|error| source.broken(&what, std::io::Error::other(error)))?;
+    if inner.compression() != npyz::zip::CompressionMethod::Stored {
+        source.note(|notes| notes.compression = Some("deflate".into()));
+    }
     let mut stream = Metered { inner, ledger: source.ledger, what: &what };
     let value = read(Array::open(source, name, &mut stream)?)?;
     // The archive's checksum is looked at where the entry ends.
@@ -148,7 +154,10 @@ struct Array<'a> {
 
 impl<'a> Array<'a> {
     fn open(source: &Source<'_>, name: &'a str, stream: &'a mut dyn Read) -> Result<Self, ReadError> {
-        Ok(Array { name, header: numpy_header::read(source, name, stream)?, stream })
+        let header = numpy_header::read(source, name, stream)?;
+        let components = header.shape.iter().skip(1).fold(1_u64, |all, n| all.saturating_mul(*n));
+        source.note_array(name, header.kind.name(), components);
+        Ok(Array { name, header, stream })
     }
 
     fn wrong_shape(&self, source: &Source<'_>, expected: &'static str) -> ReadError {
@@ -176,6 +185,19 @@ impl<'a> Array<'a> {
         let mut classes = self.filled(source, n, 0_u8)?;
         self.read(source, n as usize, |i, v| source.class(v, i).map(|class| classes[i] = class))?;
         Ok(classes)
+    }
+
+    /// Nothing where they are no whole numbers.
+    fn ids(self, source: &Source<'_>) -> Result<Option<Vec<u64>>, ReadError> {
+        let ([n] | [n, 1]) = self.header.shape[..] else {
+            return Err(self.wrong_shape(source, "N integers"));
+        };
+        let mut ids = source.ids(n)?;
+        self.read(source, n as usize, |_, v| {
+            ids.push(v);
+            Ok(())
+        })?;
+        Ok(ids.finish())
     }
 
     fn axes(self, source: &Source<'_>) -> Result<Vec<DMat3>, ReadError> {

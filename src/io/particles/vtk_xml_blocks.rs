@@ -31,6 +31,15 @@ impl Codec {
         })
     }
 
+    /// What `meniscus info` calls it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Codec::Zlib => "zlib",
+            Codec::Lz4 => "LZ4",
+            Codec::Lzma => "LZMA",
+        }
+    }
+
     /// Beginning with a block takes about as long as unpacking so many bytes.
     fn begin(self) -> u64 {
         match self {

@@ -13,6 +13,7 @@ const COLUMNS: usize = 64;
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let content = text::content(source)?;
     if text::is_text(content) {
+        source.note(|notes| notes.format = "XYZ, text".into());
         return lines(source, content);
     }
     let rest = source.bytes.len() % 12;
@@ -20,6 +21,8 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
         let at = At::Byte((source.bytes.len() - rest) as u64);
         return Err(source.malformed(at, format!("{rest} bytes left after the last whole float32 triple")));
     }
+    source.note(|notes| notes.format = "XYZ, raw".into());
+    source.note_array("position", "float32", 3);
     let mut triples = source.triples(source.bytes.len() as u64 / 12)?;
     Decoder::new(Kind::F32, false).feed(source.bytes, |v| triples.push(v));
     Ok(ParticleFile { positions: triples.finish(), ..ParticleFile::default() })
