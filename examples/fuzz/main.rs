@@ -29,24 +29,8 @@ const BUDGET: Budget = Budget::new(64 << 20);
 const LONGEST: u64 = 10;
 
 const FORMATS: [&str; 18] = [
-    "xyz",
-    "csv",
-    "ply",
-    "vtk",
-    "vtu",
-    "vtp",
-    "pvd",
-    "pvtu",
-    "dump",
-    "bgeo",
-    "npy",
-    "npz",
-    "png",
-    "hdr",
-    "exr",
-    "mesh-ply",
-    "mesh-obj",
-    "mesh-npz",
+    "xyz", "csv", "ply", "vtk", "vtu", "vtp", "pvd", "pvtu", "dump", "bgeo", "npy", "npz", "png", "hdr", "exr",
+    "mesh-ply", "mesh-obj", "mesh-npz",
 ];
 
 /// The number of the input being read, and when that began, for what watches from outside.

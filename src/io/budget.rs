@@ -3,7 +3,7 @@
 //! A file says itself how much it holds, and a hostile one lies: a kilobyte can ask for gigabytes. So every reader asks a
 //! [`Budget`] before it allocates:
 //!
-//! * What is held at once, the file's own bytes included, is at most [`MULTIPLE`] times the file's size plus a floor, a
+//! * What is held at once, the file's own bytes included (but for formats that are read in parts: BGEO, raw XYZ, NPY, NPZ), is at most [`MULTIPLE`] times the file's size plus a floor, a
 //!   [`FLOOR_SHARE`]th of the cap; and never more than the cap: 2 GiB, or what `--max-memory` says.
 //!   A pipe or device, of which the size is not known before, may give half of the cap, or a quarter as an environment map.
 //! * What is unpacked on the way, whether or not it is held, is at most [`UNPACKED`] times as much as that would be without

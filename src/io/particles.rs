@@ -26,7 +26,7 @@ mod xyz;
 
 use std::fmt;
 use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::io::{BufReader, Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
@@ -36,7 +36,7 @@ use super::{guard, quote};
 pub use collection::time_steps;
 use contents::Notes;
 pub use contents::{ArrayInfo, Contents};
-use source::Source;
+use source::{Input, Source};
 
 /// The known extensions, lower case and without dot, each with what is read from it.
 pub const FORMATS: &[(&str, &str)] = &[
@@ -284,7 +284,22 @@ fn read_noting(path: &Path, budget: &Budget, notes: &Notes, above: &[PathBuf]) -
             _ => error,
         });
     }
+    if let Some(Reader::Parts(read)) = reader(path)?
+        && let Some((file, size)) = regular(path)
+    {
+        let ledger = Ledger::of_parts(*budget, size);
+        let source = Source { path, bytes: &[], size, ledger: &ledger, notes };
+        let mut input = BufReader::with_capacity(PART, file);
+        return checked(path, quietly(path, || read(&source, &mut input))?);
+    }
     read_content(path, &bytes(path, budget)?, budget, notes, above)
+}
+
+/// A file that has a length and so can be read in parts; what goes wrong here is said where it is read whole.
+fn regular(path: &Path) -> Option<(File, u64)> {
+    let file = File::open(path).ok()?;
+    let metadata = file.metadata().ok()?;
+    (metadata.is_file() && metadata.len() > 0).then_some((file, metadata.len()))
 }
 
 /// A file's content.
@@ -336,9 +351,17 @@ fn read_content(
         return Err(ReadError::Empty { path: name.into() });
     }
     let file = match reader {
-        Some(reader) => guarded(name, bytes, budget, notes, reader)?,
+        Some(Reader::Whole(read)) => guarded(name, bytes, budget, notes, read)?,
+        Some(Reader::Parts(read)) => {
+            guarded(name, bytes, budget, notes, |source| read(source, &mut Cursor::new(source.bytes)))?
+        }
         None => collection::read(name, bytes, budget, notes, above)?,
     };
+    checked(name, file)
+}
+
+/// Every array has an entry for each particle.
+fn checked(name: &Path, file: ParticleFile) -> Result<ParticleFile, ReadError> {
     let lengths = [
         ("class", file.classes.as_ref().map(Vec::len)),
         ("velocity", file.velocities.as_ref().map(Vec::len)),
@@ -399,11 +422,23 @@ fn guarded<T>(
 ) -> Result<T, ReadError> {
     let ledger =
         Ledger::new(*budget, bytes.len() as u64).map_err(|source| ReadError::TooLarge { path: name.into(), source })?;
-    let source = Source { path: name, bytes, ledger: &ledger, notes };
-    guard::quietly(|| read(&source)).unwrap_or_else(|panic| Err(ReadError::Panicked { path: name.into(), panic }))
+    let source = Source { path: name, bytes, size: bytes.len() as u64, ledger: &ledger, notes };
+    quietly(name, || read(&source))
 }
 
-type Reader = fn(&Source<'_>) -> Result<ParticleFile, ReadError>;
+fn quietly<T>(name: &Path, read: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadError> {
+    guard::quietly(read).unwrap_or_else(|panic| Err(ReadError::Panicked { path: name.into(), panic }))
+}
+
+/// Bytes of a file that are held at a time where it is read in parts.
+const PART: usize = 1 << 16;
+
+enum Reader {
+    /// Of a content that is held.
+    Whole(fn(&Source<'_>) -> Result<ParticleFile, ReadError>),
+    /// Of one that need not be.
+    Parts(fn(&Source<'_>, &mut dyn Input) -> Result<ParticleFile, ReadError>),
+}
 
 /// The reader for the extension of `path`; none for collections, which name other files.
 fn reader(path: &Path) -> Result<Option<Reader>, ReadError> {
@@ -413,16 +448,16 @@ fn reader(path: &Path) -> Result<Option<Reader>, ReadError> {
     let dump = || path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("dump."));
     Ok(Some(match extension.as_str() {
         _ if collection::known(&extension) => return Ok(None),
-        "lammpstrj" | "dump" => lammps::read,
-        _ if numbered && dump() => lammps::read,
-        "vtk" => vtk::read,
-        "vtu" | "vtp" => vtk_xml::read,
-        "ply" => ply::read,
-        "bgeo" => bgeo::read,
-        "xyz" => xyz::read,
-        "csv" => csv::read,
-        "npy" => numpy::read_npy,
-        "npz" => numpy::read_npz,
+        "lammpstrj" | "dump" => Reader::Whole(lammps::read),
+        _ if numbered && dump() => Reader::Whole(lammps::read),
+        "vtk" => Reader::Whole(vtk::read),
+        "vtu" | "vtp" => Reader::Whole(vtk_xml::read),
+        "ply" => Reader::Whole(ply::read),
+        "bgeo" => Reader::Parts(bgeo::read),
+        "xyz" => Reader::Parts(xyz::read),
+        "csv" => Reader::Whole(csv::read),
+        "npy" => Reader::Parts(numpy::read_npy),
+        "npz" => Reader::Parts(numpy::read_npz),
         _ => return Err(ReadError::UnknownExtension { path: path.into(), extension }),
     }))
 }

@@ -7,7 +7,7 @@ use std::io::{BufReader, Read};
 use flate2::bufread::MultiGzDecoder;
 use glam::DVec3;
 
-use super::source::{Source, is_id, is_velocity};
+use super::source::{Input, Source, is_id, is_velocity};
 use super::{At, ParticleFile, ReadError};
 use crate::io::budget::Metered;
 use crate::io::quote::quote;
@@ -18,21 +18,22 @@ const POSITION: usize = 4;
 const WORDS: usize = 1 << 16;
 
 /// Reads the positions, the integer attribute `class` and velocities.
-pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    if source.bytes.starts_with(&[0x1f, 0x8b]) {
+pub(super) fn read(source: &Source<'_>, mut input: &mut dyn Input) -> Result<ParticleFile, ReadError> {
+    let packed = input.fill_buf().map_err(|error| source.broken("reading", error))?.starts_with(&[0x1f, 0x8b]);
+    if packed {
         source.note(|notes| notes.compression = Some("gzip".into()));
-        let inner = MultiGzDecoder::new(source.bytes);
+        let inner = MultiGzDecoder::new(input);
         let mut stream = BufReader::new(Metered { inner, ledger: source.ledger, what: "the unpacked gzip stream" });
         let file = read_points(source, &mut stream, None)?;
         // gzip's checksum is at its end.
         std::io::copy(&mut stream, &mut std::io::sink()).map_err(|error| source.broken("gzip", error))?;
         return Ok(file);
     }
-    read_points(source, &mut &source.bytes[..], Some(source.bytes.len()))
+    read_points(source, &mut input, Some(source.size))
 }
 
 /// `length` is that of the whole stream, if it is known.
-fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<usize>) -> Result<ParticleFile, ReadError> {
+fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<u64>) -> Result<ParticleFile, ReadError> {
     let broken = |error: std::io::Error| match error.kind() {
         std::io::ErrorKind::UnexpectedEof => source.malformed(At::Unknown, "the file ends within its points"),
         _ => source.broken("gzip", error),
@@ -60,7 +61,7 @@ fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<usize
     let attributes = usize::try_from(counts[4]).map_err(|_| negative())?;
     let layout = Layout::read(source, stream, attributes, broken)?;
     let needed = (points as u64) * 4 * layout.words as u64;
-    if let Some(length) = length.filter(|length| needed > *length as u64) {
+    if let Some(length) = length.filter(|length| needed > *length) {
         let detail = format!("the header promises {points} points, {needed} bytes; the file has {length}");
         return Err(source.malformed(At::Byte(9), detail));
     }

@@ -1,5 +1,6 @@
 //! A file's content, and what its readers share: errors that name it, room for what it holds, checks of its arrays.
 
+use std::io::{BufRead, Seek};
 use std::path::Path;
 
 use glam::DVec3;
@@ -58,10 +59,18 @@ impl Ids {
     }
 }
 
+/// What is read in parts: a file, or bytes that are held.
+pub(super) trait Input: BufRead + Seek {}
+
+impl<T: BufRead + Seek> Input for T {}
+
 /// A file's content, its path for error messages, and what reading it took so far.
 pub(super) struct Source<'a> {
     pub(super) path: &'a Path,
+    /// None where it is read from a stream.
     pub(super) bytes: &'a [u8],
+    /// Bytes of the file, whether or not they are held.
+    pub(super) size: u64,
     pub(super) ledger: &'a Ledger,
     pub(super) notes: &'a Notes,
 }

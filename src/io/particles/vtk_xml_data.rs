@@ -9,6 +9,9 @@ use super::vtk_xml_blocks::{Blocks, Codec};
 use super::{At, ReadError};
 use crate::io::quote::quote;
 
+/// Letters that are decoded at a time, a multiple of four.
+const PART: usize = 1 << 16;
+
 /// How the file stores its arrays.
 #[derive(Default)]
 pub(super) struct Encoding<'a> {
@@ -100,8 +103,16 @@ impl Array<'_> {
             None | Some("") => {
                 let length = words(&take(0, word)?)[0];
                 if base64 {
-                    let bytes = take(0, word.saturating_add(length))?;
-                    decoder.feed(&bytes[word..], each);
+                    // Header and data are encoded together; a part of whole groups of letters is whole bytes.
+                    let all = word.saturating_add(length);
+                    let (mut skip, mut left) = (word, all);
+                    for letters in part(data, 0, all, true).map_err(bad)?.chunks(PART) {
+                        let whole = left.min(letters.len() / 4 * 3);
+                        let bytes = unpack(letters, whole, true, Vec::new()).map_err(bad)?;
+                        left -= bytes.len();
+                        decoder.feed(&bytes[skip.min(bytes.len())..], &mut *each);
+                        skip = skip.saturating_sub(bytes.len());
+                    }
                 } else {
                     decoder.feed(part(data, word, length, false).map_err(bad)?, each);
                 }

@@ -74,18 +74,20 @@ struct Array {
 fn of(path: &Path, args: &Args) -> Result<Found, ReadError> {
     let (mut file, contents) = describe(path, &args.max_memory)?;
     let not_finite = check_finite(&mut file, Invalid::Drop, path)?;
-    let positions = &file.positions;
+    let positions = std::mem::take(&mut file.positions);
+    let count = positions.len();
     let bounds = positions.first().map(|first| {
         let (low, high) = positions.iter().fold((*first, *first), |(low, high), p| (low.min(*p), high.max(*p)));
         [low, high].map(|corner| corner.to_array())
     });
-    let origin = origin(positions);
+    let origin = origin(&positions);
     let relative: Vec<Vec3> = positions.iter().map(|p| (*p - origin).as_vec3()).collect();
+    drop(positions); // twice as large as what was made of them
     let radius = own_radius(file.radius, &relative).filter(|_| !relative.is_empty());
     let Contents { format, compression, time, step, steps, files, arrays } = contents;
     Ok(Found {
         file: quote::path(path),
-        particles: positions.len() + not_finite,
+        particles: count + not_finite,
         not_finite,
         bounds,
         spacing: prepare::spacing(&relative),
