@@ -24,7 +24,7 @@ for frame in range(12):
         for i in range(20 ** 3):
             print(f"{0.1 * (i % 20) + 0.05 * frame},{0.1 * (i // 20 % 20)},{0.1 * (i // 400)}", file=file)
 PYTHON
-sequence() { echo sequence 'frames/*.csv' --size 640x480 --supersample 2 --radius 0.05 --eye 5,3,-4 --target 1,1,1 --absorption 0.4,0.2,0.1 "$@"; }
+sequence() { echo sequence 'frames/*.csv' --size 320x240 --supersample 2 --radius 0.05 --eye 5,3,-4 --target 1,1,1 --absorption 0.4,0.2,0.1 "$@"; }
 "$meniscus" $(sequence -o 'whole/##.png') 2> whole.log
 
 # ENGINE: hands it over, calls what interrupts it, and waits for the film that the last task makes.
@@ -32,7 +32,7 @@ submit() {
   rm -rf out film.gif
   "$meniscus" submit --engine "$1" -o "job-$1" --tasks 3 "${@:2}" -- $(sequence -o 'out/##.png' -o film.gif)
 }
-until_there() { for ((i = 0; i < 1200; i++)); do [ ! -e "$1" ] || return 0; sleep 0.1; done; echo "no $1" >&2; cat job-*/*.log >&2; return 1; }
+until_there() { for ((i = 0; i < 4000; i++)); do [ ! -e "$1" ] || return 0; sleep 0.1; done; echo "no $1" >&2; cat job-*/*.log >&2; return 1; }
 compare() {
   until_there film.gif
   diff -r whole out

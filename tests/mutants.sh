@@ -25,7 +25,7 @@ export CARGO_TARGET_DIR=$PWD/target/mutants SHADERC_LIB_DIR=${SHADERC_LIB_DIR:-$
 # Dependencies are what they are: taken over from the usual build, where there is one. Ours are not.
 if [ ! -e target/mutants ] && [ -d target/debug/deps ]; then
   (cd target && find debug/deps debug/build debug/.fingerprint -type f ! -path '*meniscus*' -regextype posix-extended \
-     ! -regex '.*/(gpu|cpu|cli|endurance|view|fuzz|embed|capi)-[^/]*(/.*)?' -print0 |
+     ! -regex '.*/(gpu|cpu|cli|endurance|memory|view|fuzz|embed|capi)-[^/]*(/.*)?' -print0 |
      { mkdir -p mutants && xargs -0 cp -l --parents -t mutants; })
 fi
 
@@ -38,12 +38,12 @@ run() { # tests of one binary, in the copy
 }
 place() { # binary and name of a test
   case $1 in
-    endurance::* | cpu::* | cli::* | view::* | lib::* | capi::* | capilib::*) binary=${1%%::*} name=${1#*::} ;;
+    endurance::* | memory::* | cpu::* | cli::* | view::* | lib::* | capi::* | capilib::*) binary=${1%%::*} name=${1#*::} ;;
     *) binary=gpu name=$1 ;;
   esac
 }
 # Without a mistake they pass, or their failing would say nothing.
-for each in gpu endurance cpu cli view lib capi capilib; do
+for each in gpu endurance memory cpu cli view lib capi capilib; do
   sound=()
   for line in "${lines[@]}"; do
     place "${line##* ::: }"

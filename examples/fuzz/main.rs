@@ -28,9 +28,9 @@ const BUDGET: Budget = Budget::new(64 << 20);
 /// No input takes longer, in seconds, in a debug build on a busy machine.
 const LONGEST: u64 = 10;
 
-const FORMATS: [&str; 15] = [
-    "xyz", "csv", "ply", "vtk", "vtu", "vtp", "bgeo", "npy", "npz", "png", "hdr", "exr", "mesh-ply", "mesh-obj",
-    "mesh-npz",
+const FORMATS: [&str; 18] = [
+    "xyz", "csv", "ply", "vtk", "vtu", "vtp", "pvd", "pvtu", "dump", "bgeo", "npy", "npz", "png", "hdr", "exr",
+    "mesh-ply", "mesh-obj", "mesh-npz",
 ];
 
 /// The number of the input being read, and when that began, for what watches from outside.
@@ -171,6 +171,7 @@ fn check(name: &Path, content: &[u8]) -> Result<String, String> {
             let n = file.positions.len();
             let lengths = file.classes.as_ref().is_none_or(|c| c.len() == n && c.iter().all(|c| *c < 2))
                 && file.velocities.as_ref().is_none_or(|v| v.len() == n && v.iter().all(|v| v.is_finite()))
+                && file.ids.as_ref().is_none_or(|ids| ids.len() == n)
                 && file.axes.as_ref().is_none_or(|a| a.len() == n);
             let radii = [file.radius, file.support].into_iter().flatten().all(|r| r.is_finite() && r > 0.0);
             match lengths && radii && file.positions.iter().all(|p| p.is_finite()) {

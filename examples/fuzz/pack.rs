@@ -9,6 +9,9 @@ use flate2::write::{GzEncoder, ZlibEncoder};
 use npyz::npz::NpzWriter;
 use npyz::zip::{CompressionMethod, write::FileOptions};
 
+/// Packs what was mutated.
+pub type Pack = fn(&[u8]) -> Vec<u8>;
+
 pub fn gzip(content: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
     encoder.write_all(content).and_then(|()| encoder.finish()).expect("into memory")
@@ -34,17 +37,30 @@ pub fn npz(arrays: &[(&str, &[u8])], method: CompressionMethod) -> Vec<u8> {
     content.into_inner()
 }
 
-/// A VTU file with three points and this as their inline data.
-pub fn vtu(data: &[u8], compressed: bool) -> Vec<u8> {
-    let (attributes, inline) = if compressed {
-        let block = zlib(data);
+pub fn lz4(content: &[u8]) -> Vec<u8> {
+    lz4_flex::block::compress(content)
+}
+
+/// With a dictionary that a small budget has room for.
+pub fn xz(content: &[u8]) -> Vec<u8> {
+    let mut options = lzma_rust2::XzOptions::with_preset(0);
+    options.lzma_options.dict_size = 1 << 16;
+    let mut writer = lzma_rust2::XzWriter::new(Vec::new(), options).expect("options");
+    writer.write_all(content).and_then(|()| writer.finish()).expect("into memory")
+}
+
+/// A VTU file with three points and this as their inline data; or with as many as there are in its one block, which a compressor of
+/// this name packs.
+pub fn vtu(data: &[u8], compressed: Option<(&str, Pack)>) -> Vec<u8> {
+    let (attributes, inline) = if let Some((name, pack)) = compressed {
+        let block = pack(data);
         let head: Vec<u8> =
             [1, data.len() as u32, 0, block.len() as u32].iter().flat_map(|v| v.to_le_bytes()).collect();
-        (" compressor=\"vtkZLibDataCompressor\"", STANDARD.encode(head) + &STANDARD.encode(block))
+        (format!(" compressor=\"{name}\""), STANDARD.encode(head) + &STANDARD.encode(block))
     } else {
-        ("", STANDARD.encode(data))
+        (String::new(), STANDARD.encode(data))
     };
-    let points = if compressed { (data.len() / 12).max(1) } else { 3 };
+    let points = if compressed.is_some() { (data.len() / 12).max(1) } else { 3 };
     format!(
         "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\"{attributes}><PolyData><Piece NumberOfPoints=\"{points}\"><Points>\
          <DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"binary\">{inline}</DataArray></Points></Piece>\

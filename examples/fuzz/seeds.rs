@@ -7,15 +7,13 @@ use exr::prelude as ex;
 use exr::prelude::WritableImage as _;
 use npyz::zip::CompressionMethod::{Deflated, Stored};
 
-use super::pack;
+use super::pack::{self, Pack};
 
 /// A file's content before it is packed, and how that is done.
 pub struct Seed {
     pub bytes: Vec<u8>,
     pack: Pack,
 }
-
-type Pack = fn(&[u8]) -> Vec<u8>;
 
 impl Seed {
     pub fn pack(&self, bytes: &[u8]) -> Vec<u8> {
@@ -52,10 +50,25 @@ pub fn of(format: &str) -> Vec<Seed> {
             b"# note\nclass,z,id,Y,x,radius\n1,2,9,-1.25,0.5,0.25\n0,-0.125,8,4.5,3,0.25\n".to_vec(),
             format!("x\ty\tz\n{}", rows("\t")).into(),
             b"x,y,z,vx,vy,vz\n0,1,2,0.5,-1,nan\n3,4,5,0,2,0\n".to_vec(),
+            b"Part;Time [s]\n3;0.5\nPos.x [m];Pos.y [m];Pos.z [m];Idp;\n1;2;3;7;\n4;5;6;8;\n".to_vec(),
         ],
         "ply" => ply(),
         "vtk" => vtk(),
         "vtu" | "vtp" => vtu(),
+        "pvd" | "pvtu" => collections(format),
+        "dump" => vec![
+            lammps("pp pp pp\n0 1\n0 2\n-1 1", "id type xs ys zs", "1 1 "),
+            lammps(
+                "xy xz yz pp pp pp\n-1.5 3 -0.5\n0 2.25 2\n0 1 0.25",
+                "class vx vy vz id diameter xsu ysu zsu",
+                "1 1 2 3 7 0.5 ",
+            ),
+            format!(
+                "ITEM: UNITS\nlj\nITEM: TIME\n0.25\n{}",
+                String::from_utf8_lossy(&lammps("abc origin\n2 0 0 1\n0 0 3 2\n0 1 0 3", "x y z", ""))
+            )
+            .into(),
+        ],
         "bgeo" => vec![
             bgeo(&[], 0),
             bgeo(b"\0\x05class\0\x01\0\0\0\x01\0\0\0\0", 1),
@@ -119,8 +132,15 @@ pub fn of(format: &str) -> Vec<Seed> {
     }
     if matches!(format, "vtu" | "vtp") {
         let data = [&36_u32.to_le_bytes()[..], &packed(f32::to_le_bytes)].concat();
-        seeds.push(Seed { bytes: data, pack: |data| pack::vtu(data, false) });
-        seeds.push(Seed { bytes: packed(f32::to_le_bytes), pack: |data| pack::vtu(data, true) });
+        seeds.push(Seed { bytes: data, pack: |data| pack::vtu(data, None) });
+        let packs: [Pack; 4] = [
+            |data| pack::vtu(data, Some(("vtkZLibDataCompressor", pack::zlib))),
+            |data| pack::vtu(data, Some(("vtkLZ4DataCompressor", pack::lz4))),
+            |data| pack::vtu(data, Some(("vtkLZMADataCompressor", pack::xz))),
+            // Mutated after it was packed.
+            |data| pack::vtu(data, Some(("vtkLZ4DataCompressor", |data| data.to_vec()))),
+        ];
+        seeds.extend(packs.map(|pack| Seed { bytes: packed(f32::to_le_bytes), pack }));
     }
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
     let mut kept: Vec<_> =
@@ -129,6 +149,35 @@ pub fn of(format: &str) -> Vec<Seed> {
     let kept = kept.iter().filter(|path| path.extension().is_some_and(|extension| extension == format));
     seeds.extend(kept.map(|path| plain(std::fs::read(path).expect("readable"))));
     seeds
+}
+
+/// Of files that are kept in tests/corpus; fuzzing runs in the folder above.
+fn collections(format: &str) -> Vec<Vec<u8>> {
+    let kept = ["vtk_lz4_raw.vtu", "vtk_lz4_inline.vtu", "vtk_blocks.vtm"].map(|name| format!("tests/corpus/{name}"));
+    let file =
+        |kind: &str, body: &str| format!("<VTKFile type=\"{kind}\"><{kind}>{body}</{kind}></VTKFile>\n").into_bytes();
+    let sets = |times: [&str; 3]| -> String {
+        let sets = kept.iter().zip(times).map(|(name, time)| format!("<DataSet timestep=\"{time}\" file=\"{name}\"/>"));
+        sets.collect()
+    };
+    let pieces: String = kept.iter().take(2).map(|name| format!("<Piece Source=\"{name}\"/>")).collect();
+    match format {
+        "pvd" => vec![
+            file("Collection", &sets(["0", "0", "0"])),
+            file("Collection", &sets(["0", "0.5", "1"])),
+            file("Collection", &pieces),
+        ],
+        _ => vec![
+            file("PUnstructuredGrid", &pieces),
+            file("PUnstructuredGrid", &format!("<PPoints/>{}", sets(["1", "1", "1"]))),
+        ],
+    }
+}
+
+fn lammps(bounds: &str, columns: &str, before: &str) -> Vec<u8> {
+    let rows: String = rows(" ").lines().map(|row| format!("{before}{row}\n")).collect();
+    format!("ITEM: TIMESTEP\n10\nITEM: NUMBER OF ATOMS\n3\nITEM: BOX BOUNDS {bounds}\nITEM: ATOMS {columns}\n{rows}")
+        .into()
 }
 
 fn ply() -> Vec<Vec<u8>> {

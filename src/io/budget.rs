@@ -3,7 +3,7 @@
 //! A file says itself how much it holds, and a hostile one lies: a kilobyte can ask for gigabytes. So every reader asks a
 //! [`Budget`] before it allocates:
 //!
-//! * What is held at once, the file's own bytes included, is at most [`MULTIPLE`] times the file's size plus a floor, a
+//! * What is held at once, the file's own bytes included (but for formats that are read in parts: BGEO, raw XYZ, NPY, NPZ), is at most [`MULTIPLE`] times the file's size plus a floor, a
 //!   [`FLOOR_SHARE`]th of the cap; and never more than the cap: 2 GiB, or what `--max-memory` says.
 //!   A pipe or device, of which the size is not known before, may give half of the cap, or a quarter as an environment map.
 //! * What is unpacked on the way, whether or not it is held, is at most [`UNPACKED`] times as much as that would be without
@@ -142,6 +142,11 @@ impl Ledger {
         Ok(ledger)
     }
 
+    /// What is made of several files, which are not held at once.
+    pub(crate) fn of_parts(budget: Budget, files: u64) -> Ledger {
+        Ledger { budget, file: files, held: Cell::new(0), unpacked: Cell::new(0) }
+    }
+
     /// Asks for room for `count` values of `each` bytes. Nothing is given back: what is freed early is not worth the books.
     pub(crate) fn hold_all(&self, count: u64, each: usize, what: &str) -> Result<(), OverBudget> {
         self.hold(count.saturating_mul(each as u64), what)
@@ -149,6 +154,11 @@ impl Ledger {
 
     fn hold(&self, bytes: u64, what: &str) -> Result<(), OverBudget> {
         self.add(&self.held, bytes, self.budget.allowance(self.file), what)
+    }
+
+    /// Bytes that may be held beside those that are.
+    pub(crate) fn left(&self) -> u64 {
+        self.budget.allowance(self.file).saturating_sub(self.held.get())
     }
 
     /// Notes bytes that were decompressed and are not kept.

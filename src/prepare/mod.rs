@@ -31,7 +31,7 @@ pub use device::{DeviceIds, DevicePositions};
 pub use neighbours::Search;
 pub use options::{Fit, Options};
 pub use points::points;
-pub use spacing::estimate_radius;
+pub use spacing::{estimate_radius, spacing};
 
 use crate::{
     particles::{Class, Ellipsoid, Particles},

@@ -9,12 +9,16 @@ use super::neighbours::distance_squared;
 /// spacing; half the median is divided by the middle of that.
 const COMPRESSION: f32 = 0.9;
 
-/// Half the median nearest-neighbour distance of the distinct finite positions, divided by 0.9;
-/// `None` where fewer than two are distinct.
+/// Half the median nearest-neighbour distance ([`spacing`]), divided by 0.9.
 ///
 /// A guess, good to about 7 % on simulated liquid (too large by 11 % on an undisturbed lattice):
 /// a radius from the simulation is always better.
 pub fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
+    spacing(positions).map(|median| 0.5 * median / COMPRESSION)
+}
+
+/// The median nearest-neighbour distance of the distinct finite positions; `None` where fewer than two are distinct.
+pub fn spacing(positions: &[Vec3]) -> Option<f32> {
     let mut points: Vec<Vec3> = positions.iter().copied().filter(|p| p.is_finite()).collect();
     let key = |p: &Vec3| (*p + Vec3::ZERO).to_array().map(f32::to_bits); // -0 and 0 are one place
     points.par_sort_unstable_by_key(key);
@@ -32,7 +36,7 @@ pub fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
     let mut squared: Vec<f64> = points.par_iter().map(nearest).collect();
     let middle = squared.len() / 2;
     let (_, median, _) = squared.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(0.5 * median.sqrt() as f32 / COMPRESSION)
+    Some(median.sqrt() as f32)
 }
 
 /// Orders points as a k-d tree: the root in the middle, split across the axis noted there.

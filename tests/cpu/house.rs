@@ -94,7 +94,7 @@ fn planted_mistakes_can_be_planted() {
         assert_eq!(code.matches(text).count(), 1, "{file}: {text}");
         let (module, name) = test.rsplit_once("::").expect("module::test");
         let folder = match module.split("::").next() {
-            Some("cpu" | "cli" | "view" | "endurance") => "tests",
+            Some("cpu" | "cli" | "view" | "endurance" | "memory") => "tests",
             Some("capi") => "capi/tests",
             Some("lib") => "src",
             Some("capilib") => "capi/src",

@@ -1,10 +1,30 @@
 //! `meniscus info`.
 
-use crate::terminal::line;
-use meniscus::{host::Instance, io::particles::FORMATS};
-use std::{error::Error, process::ExitCode};
+mod contents;
 
-pub fn run() -> Result<ExitCode, Box<dyn Error>> {
+use crate::terminal::line;
+use meniscus::{
+    host::Instance,
+    io::{Budget, particles::FORMATS},
+};
+use std::{error::Error, path::PathBuf, process::ExitCode};
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// Particle files to describe; needs no Vulkan
+    files: Vec<PathBuf>,
+    /// Describe them as a JSON list
+    #[arg(long, requires = "files")]
+    json: bool,
+    /// Memory that reading a file may take
+    #[arg(long, value_name = "BYTES", default_value_t, requires = "files")]
+    max_memory: Budget,
+}
+
+pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
+    if !args.files.is_empty() {
+        return contents::run(args);
+    }
     line(format!("meniscus {}", env!("CARGO_PKG_VERSION")))?;
     line("")?;
     line("Particle files (read)")?;

@@ -85,8 +85,8 @@ enum Command {
     View(Box<view::Args>),
     /// Print what a driver's compiler makes of a method's shaders: registers, spills, occupancy; needs no GPU
     Pipelines(Box<pipelines::Args>),
-    /// List devices, drivers, features, limits and file formats.
-    Info,
+    /// List devices, drivers, features, limits and file formats; or what is in particle files.
+    Info(info::Args),
 }
 
 fn main() -> ExitCode {
@@ -127,7 +127,7 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         Command::View(args) => view::run(&args),
         Command::Pipelines(args) => pipelines::run(&args),
         Command::Submit(args) => submit::run(&args),
-        Command::Info => info::run(),
+        Command::Info(args) => info::run(&args),
     }
 }
 

@@ -82,6 +82,8 @@ impl Scene {
         };
         let policy = if picture.drop_invalid { Invalid::Drop } else { Invalid::Reject };
         let dropped = check_finite(&mut file, policy, path)?;
+        // Simulators may write them in another order each time; those of a sequence are followed.
+        file.sort_by_ids();
         bar.finish_and_clear();
         Ok((file, dropped))
     }
@@ -100,16 +102,8 @@ impl Scene {
         let (radius, radius_source) = match (picture.radius, file.radius, source) {
             (Some(r), _, _) => (r, "given"),
             (None, _, None) => (EMBEDDED_RADIUS, "embedded scene"),
-            (None, Some(r), _) => (r, "file"),
-            (None, None, _) if positions.is_empty() => (1.0, "no particles"),
-            (None, None, _) => match prepare::estimate_radius(&positions) {
-                Some(r) => (f64::from(r), "estimated from spacing"),
-                None => {
-                    return Err(
-                        "the particle radius cannot be estimated from fewer than two places: give --radius".into()
-                    );
-                }
-            },
+            (None, r, _) => own_radius(r, &positions)
+                .ok_or("the particle radius cannot be estimated from fewer than two places: give --radius")?,
         };
         let reach = positions.iter().fold(radius.abs(), |m, p| m.max(f64::from(p.abs().max_element())));
         if reach.is_nan() || reach >= 1e37 {
@@ -281,7 +275,7 @@ fn uniform(input: &Input, options: &Options) -> Particles {
 }
 
 /// Zero, or the middle of a cloud that lies so far out that single precision would coarsen it.
-fn origin(positions: &[DVec3]) -> DVec3 {
+pub fn origin(positions: &[DVec3]) -> DVec3 {
     let Some((low, high)) = positions.iter().map(|p| (*p, *p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
         return DVec3::ZERO;
     };
@@ -294,6 +288,15 @@ static ONE_BAR: AtomicBool = AtomicBool::new(false);
 /// From now on steps of the work show no bars of their own: there is one for all of it.
 pub fn one_bar() {
     ONE_BAR.store(true, Ordering::Relaxed);
+}
+
+/// The radius where none is given: the file's or, where it has none, what positions tell; and which of them it is.
+pub fn own_radius(file: Option<f64>, positions: &[Vec3]) -> Option<(f64, &'static str)> {
+    match file {
+        Some(r) => Some((r, "file")),
+        None if positions.is_empty() => Some((1.0, "no particles")),
+        None => prepare::estimate_radius(positions).map(|r| (f64::from(r), "estimated from spacing")),
+    }
 }
 
 /// A bar for work that may take longer than a second; shown on terminals only.

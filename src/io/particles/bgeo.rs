@@ -7,7 +7,7 @@ use std::io::{BufReader, Read};
 use flate2::bufread::MultiGzDecoder;
 use glam::DVec3;
 
-use super::source::{Source, is_velocity};
+use super::source::{Input, Source, is_id, is_velocity};
 use super::{At, ParticleFile, ReadError};
 use crate::io::budget::Metered;
 use crate::io::quote::quote;
@@ -18,20 +18,22 @@ const POSITION: usize = 4;
 const WORDS: usize = 1 << 16;
 
 /// Reads the positions, the integer attribute `class` and velocities.
-pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    if source.bytes.starts_with(&[0x1f, 0x8b]) {
-        let inner = MultiGzDecoder::new(source.bytes);
+pub(super) fn read(source: &Source<'_>, mut input: &mut dyn Input) -> Result<ParticleFile, ReadError> {
+    let packed = input.fill_buf().map_err(|error| source.broken("reading", error))?.starts_with(&[0x1f, 0x8b]);
+    if packed {
+        source.note(|notes| notes.compression = Some("gzip".into()));
+        let inner = MultiGzDecoder::new(input);
         let mut stream = BufReader::new(Metered { inner, ledger: source.ledger, what: "the unpacked gzip stream" });
         let file = read_points(source, &mut stream, None)?;
         // gzip's checksum is at its end.
         std::io::copy(&mut stream, &mut std::io::sink()).map_err(|error| source.broken("gzip", error))?;
         return Ok(file);
     }
-    read_points(source, &mut &source.bytes[..], Some(source.bytes.len()))
+    read_points(source, &mut input, Some(source.size))
 }
 
 /// `length` is that of the whole stream, if it is known.
-fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<usize>) -> Result<ParticleFile, ReadError> {
+fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<u64>) -> Result<ParticleFile, ReadError> {
     let broken = |error: std::io::Error| match error.kind() {
         std::io::ErrorKind::UnexpectedEof => source.malformed(At::Unknown, "the file ends within its points"),
         _ => source.broken("gzip", error),
@@ -59,11 +61,13 @@ fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<usize
     let attributes = usize::try_from(counts[4]).map_err(|_| negative())?;
     let layout = Layout::read(source, stream, attributes, broken)?;
     let needed = (points as u64) * 4 * layout.words as u64;
-    if let Some(length) = length.filter(|length| needed > *length as u64) {
+    if let Some(length) = length.filter(|length| needed > *length) {
         let detail = format!("the header promises {points} points, {needed} bytes; the file has {length}");
         return Err(source.malformed(At::Byte(9), detail));
     }
+    source.note(|notes| notes.format = "BGEO, version 5".into());
     let mut positions = source.room(points as u64, "positions")?;
+    let mut ids = source.ids(if layout.id.is_some() { points as u64 } else { 0 })?;
     let mut classes = source.room(if layout.class.is_some() { points as u64 } else { 0 }, "classes")?;
     let mut velocities = source.room(if layout.velocity.is_some() { points as u64 } else { 0 }, "velocities")?;
     let mut record = vec![0; 4 * layout.words];
@@ -73,12 +77,14 @@ fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<usize
         let vector = |at: usize| DVec3::from_array([0, 1, 2].map(|axis| f32::from_be_bytes(words[at + axis]).into()));
         positions.push(vector(0));
         velocities.extend(layout.velocity.map(vector));
+        layout.id.iter().for_each(|id| ids.push(i32::from_be_bytes(words[*id]).into()));
         if let Some(class) = layout.class {
             classes.push(source.class(i32::from_be_bytes(words[class]).into(), index)?);
         }
     }
     let (classes, velocities) = (layout.class.map(|_| classes), layout.velocity.map(|_| velocities));
-    Ok(ParticleFile { positions, classes, velocities, ..ParticleFile::default() })
+    let ids = layout.id.and_then(|_| ids.finish());
+    Ok(ParticleFile { positions, classes, velocities, ids, ..ParticleFile::default() })
 }
 
 /// Where a point's record has what.
@@ -86,6 +92,7 @@ struct Layout {
     words: usize,
     class: Option<usize>,
     velocity: Option<usize>,
+    id: Option<usize>,
 }
 
 impl Layout {
@@ -96,7 +103,7 @@ impl Layout {
         attributes: usize,
         broken: impl Fn(std::io::Error) -> ReadError,
     ) -> Result<Layout, ReadError> {
-        let mut layout = Layout { words: POSITION, class: None, velocity: None };
+        let mut layout = Layout { words: POSITION, class: None, velocity: None, id: None };
         for _ in 0..attributes {
             let name = text(stream).map_err(&broken)?;
             let size = usize::from(short(stream).map_err(&broken)?);
@@ -115,6 +122,12 @@ impl Layout {
                     let detail = format!("attribute `{}` has the unknown type {kind}", quote(&name));
                     return Err(source.malformed_but(At::Unknown, detail, "remove the attribute and export again"));
                 }
+            }
+            let known = [(0, "float"), (1, "int"), (4, "string"), (5, "vector")];
+            let called = known.iter().find(|(number, _)| *number == kind).map_or("", |(_, name)| name);
+            source.note_array(&name, called, size as u64);
+            if is_id(&name) && (kind, size) == (1, 1) {
+                layout.id.get_or_insert(layout.words);
             }
             if name == "class" {
                 if (kind, size) != (1, 1) {

@@ -3,18 +3,25 @@
 use ::csv::{ReaderBuilder, StringRecord, Trim};
 use glam::DVec3;
 
-use super::source::Source;
+use super::source::{Source, is_id};
 use super::text::{self, CommaCheck};
 use super::{At, ParticleFile, ReadError};
 use crate::io::quote::{list, quote};
 
-/// Reads columns separated by tabs, semicolons or commas, found by the header's names; without a header the first three.
+/// Lines that may come before the names of columns.
+const PREFACE: usize = 16;
+const DELIMITERS: [u8; 3] = [b'\t', b';', b','];
+
+/// Reads columns separated by tabs, semicolons or commas, found by the header's names, before which may be lines about the
+/// whole; without a header the first three.
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let content = text::content(source)?;
+    let whole = text::content(source)?;
+    let preface = Preface::of(whole);
+    let content = &whole[preface.length..];
     let mut lines = text::lines(content).map(|(_, line)| line);
     let first_line = lines.find(|line| !line.is_empty() && !line.starts_with(b"#")).unwrap_or_default();
     // A comma may be part of a number where another separator is there, not the other way round.
-    let delimiter = [b'\t', b';', b','].into_iter().find(|d| first_line.contains(d)).unwrap_or(b',');
+    let delimiter = DELIMITERS.into_iter().find(|d| first_line.contains(d)).unwrap_or(b',');
     let mut reader = ReaderBuilder::new()
         .has_headers(false)
         .delimiter(delimiter)
@@ -22,9 +29,10 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
         .trim(Trim::All)
         .from_reader(content);
     let mut record = StringRecord::new();
+    let line = |record: &StringRecord| preface.line(record.position());
     let mut next = |record: &mut StringRecord| {
         reader.read_record(record).map_err(|error| {
-            let at = error.position().map_or(At::Unknown, |position| At::Line(position.line()));
+            let at = preface.line(error.position());
             source.malformed_but(
                 at,
                 detail(&error),
@@ -34,7 +42,16 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     };
     let mut more = next(&mut record)?;
     let has_header = record.iter().take(3).any(|field| field.parse::<f64>().is_err());
-    let columns = if has_header { Columns::named(source, &record)? } else { Columns::first(source, &record)? };
+    let columns =
+        if has_header { Columns::named(source, &record, line(&record))? } else { Columns::first(source, &record)? };
+    for (i, name) in record.iter().enumerate() {
+        let number = (i + 1).to_string();
+        source.note_array(if has_header { name } else { &number }, "text", 1);
+    }
+    source.note(|notes| {
+        (notes.format, notes.time) =
+            (format!("columns of text, separated by {}", char::from(delimiter).escape_default()), preface.time);
+    });
     let first = line(&record);
     if has_header {
         more = next(&mut record)?;
@@ -44,6 +61,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let mut classes: Vec<u8> = source.room(some(columns.class, rows), "classes")?;
     let moving = if columns.velocity.is_some() { rows } else { 0 };
     let mut velocities: Vec<DVec3> = source.room(moving, "velocities")?;
+    let mut ids = source.ids(some(columns.id, rows))?;
     let mut radii: Vec<f64> = source.room(some(columns.radius, rows), "radii")?;
     let mut check = CommaCheck::default();
     while more {
@@ -59,6 +77,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
         if let Some([x, y, z]) = columns.velocity {
             velocities.push(DVec3::new(number(x)?, number(y)?, number(z)?));
         }
+        if let Some(column) = columns.id {
+            ids.push(record.get(column).and_then(|word| word.parse().ok()).unwrap_or(f64::NAN));
+        }
         if let Some(column) = columns.radius {
             radii.push(number(column)?);
         }
@@ -72,11 +93,69 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     }
     let (classes, velocities) = (columns.class.map(|_| classes), columns.velocity.map(|_| velocities));
     let radius = source.length("radius", radii)?;
-    Ok(ParticleFile { positions, radius, classes, velocities, ..ParticleFile::default() })
+    let ids = columns.id.and_then(|_| ids.finish());
+    Ok(ParticleFile { positions, radius, classes, velocities, ids, ..ParticleFile::default() })
 }
 
-fn line(record: &StringRecord) -> At {
-    record.position().map_or(At::Unknown, |position| At::Line(position.line()))
+/// What comes before the names of columns.
+#[derive(Default)]
+struct Preface {
+    length: usize,
+    lines: u64,
+    time: Option<f64>,
+}
+
+impl Preface {
+    /// There is one where the first line has words and no positions, and one soon after names them.
+    fn of(content: &[u8]) -> Preface {
+        let mut before: Vec<Vec<String>> = Vec::new();
+        for (number, line) in text::lines(content).take(PREFACE) {
+            let text = String::from_utf8_lossy(line);
+            let delimiter = DELIMITERS.into_iter().find(|d| line.contains(d)).unwrap_or(b',');
+            let names: Vec<String> = text.split(char::from(delimiter)).map(|name| name.trim().to_owned()).collect();
+            let numbers = names.len() >= 3 && names[..3].iter().all(|name| name.parse::<f64>().is_ok());
+            let comment = line.is_empty() || line.starts_with(b"#");
+            if before.is_empty() && numbers && !comment {
+                break;
+            }
+            if !comment && triple(names.iter().map(String::as_str), &POSITIONS, true).is_some() {
+                let length = line.as_ptr() as usize - content.as_ptr() as usize;
+                return if before.is_empty() {
+                    Preface::default()
+                } else {
+                    Preface { length, lines: number - 1, time: time(&before) }
+                };
+            }
+            if !comment {
+                before.push(names);
+            }
+        }
+        Preface::default()
+    }
+
+    fn line(&self, position: Option<&::csv::Position>) -> At {
+        position.map_or(At::Unknown, |position| At::Line(self.lines + position.line()))
+    }
+}
+
+/// The number below the word for time, with or without its unit.
+fn time(before: &[Vec<String>]) -> Option<f64> {
+    let is_time = |name: &String| ["time", "timestep"].contains(&without_unit(name).to_ascii_lowercase().as_str());
+    before.windows(2).find_map(|two| two[1].get(two[0].iter().position(is_time)?)?.parse().ok())
+}
+
+/// A column's name but for a unit behind it: `Pos.x [m]`.
+fn without_unit(name: &str) -> &str {
+    let name = name.trim();
+    let unit = name
+        .strip_suffix(']')
+        .and_then(|n| n.rsplit_once('['))
+        .or(name.strip_suffix(')').and_then(|n| n.rsplit_once('(')));
+    match unit {
+        // `v[0]` has no unit.
+        Some((name, unit)) if !["0", "1", "2", "x", "y", "z", "X", "Y", "Z"].contains(&unit.trim()) => name.trim_end(),
+        _ => name,
+    }
 }
 
 /// csv's own words name byte offsets and records beside the line.
@@ -94,6 +173,7 @@ fn detail(error: &::csv::Error) -> String {
 struct Columns {
     axes: [usize; 3],
     class: Option<usize>,
+    id: Option<usize>,
     radius: Option<usize>,
     velocity: Option<[usize; 3]>,
     count: usize,
@@ -103,7 +183,7 @@ impl Columns {
     fn first(source: &Source<'_>, record: &StringRecord) -> Result<Columns, ReadError> {
         match record.len() {
             0..3 => Err(Self::missing(source, record)),
-            count => Ok(Columns { axes: [0, 1, 2], class: None, radius: None, velocity: None, count }),
+            count => Ok(Columns { axes: [0, 1, 2], class: None, id: None, radius: None, velocity: None, count }),
         }
     }
 
@@ -112,13 +192,14 @@ impl Columns {
     }
 
     /// `x`, `y` and `z` count; else the first names that are the same but for their axis, `px` or `Points:0` alike.
-    fn named(source: &Source<'_>, header: &StringRecord) -> Result<Columns, ReadError> {
-        let Some(axes) = triple(header, &POSITIONS, true) else {
+    fn named(source: &Source<'_>, header: &StringRecord, at: At) -> Result<Columns, ReadError> {
+        let Some(axes) = triple(header.iter(), &POSITIONS, true) else {
             return Err(Self::missing(source, header));
         };
-        let velocity = triple(header, &VELOCITIES, false);
+        let velocity = triple(header.iter(), &VELOCITIES, false);
         let one = |name: &str| {
-            let mut places = header.iter().enumerate().filter(|(_, n)| n.eq_ignore_ascii_case(name)).map(|(i, _)| i);
+            let mut places =
+                header.iter().enumerate().filter(|(_, n)| without_unit(n).eq_ignore_ascii_case(name)).map(|(i, _)| i);
             (places.next(), places.next().is_some())
         };
         let ((class, two_classes), (radius, two_radii)) = (one("class"), one("radius"));
@@ -130,10 +211,11 @@ impl Columns {
         let repeated = repeated.or(two_classes.then_some("class")).or(two_radii.then_some("radius"));
         if let Some(name) = repeated {
             let detail = format!("column `{}` is there twice", quote(name));
-            return Err(source.malformed_but(line(header), detail, "remove or rename one of them"));
+            return Err(source.malformed_but(at, detail, "remove or rename one of them"));
         }
+        let id = header.iter().position(|name| is_id(without_unit(name)));
         let columns = |found: [(usize, bool); 3]| found.map(|(column, _)| column);
-        Ok(Columns { axes: columns(axes), class, radius, velocity: velocity.map(columns), count: header.len() })
+        Ok(Columns { axes: columns(axes), class, id, radius, velocity: velocity.map(columns), count: header.len() })
     }
 }
 
@@ -157,8 +239,8 @@ const VELOCITIES: [&str; 4] = ["v", "vel", "velocity", "velocities"];
 
 /// Three columns of vectors, and whether each is there once more: the first whose names are the same but for their axis; names
 /// that are nothing but an axis first, where they count.
-fn triple(header: &StringRecord, stems: &[&str], bare: bool) -> Option<[(usize, bool); 3]> {
-    let names: Vec<Option<(String, usize, bool)>> = header.iter().map(|name| axis(name, stems, bare)).collect();
+fn triple<'a>(header: impl Iterator<Item = &'a str>, stems: &[&str], bare: bool) -> Option<[(usize, bool); 3]> {
+    let names: Vec<Option<(String, usize, bool)>> = header.map(|name| axis(name, stems, bare)).collect();
     let place = |stem: &str, axis: usize, digits: bool| {
         let same = |name: &Option<(String, usize, bool)>| {
             name.as_ref().is_some_and(|name| (name.0.as_str(), name.1, name.2) == (stem, axis, digits))
@@ -182,7 +264,8 @@ fn triple(header: &StringRecord, stems: &[&str], bare: bool) -> Option<[(usize, 
 /// Whether a column named `name` holds vectors along an axis: `x` (where `bare` names count), `Points:0`, `position_x`, `Pos.X`,
 /// `px` and the like. Its stem, the axis, and whether a digit names it.
 fn axis(name: &str, stems: &[&str], bare: bool) -> Option<(String, usize, bool)> {
-    let mut stem: String = name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
+    let mut stem: String =
+        without_unit(name).chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
     let last = stem.pop()?;
     let (axis, digits) = "xyz".find(last).map(|i| (i, false)).or("012".find(last).map(|i| (i, true)))?;
     let known = stems.contains(&stem.as_str()) || (bare && stem.is_empty() && !digits);

@@ -36,6 +36,23 @@ impl Kind {
         })
     }
 
+    /// What `meniscus info` calls it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Kind::F16 => "float16",
+            Kind::F32 => "float32",
+            Kind::F64 => "float64",
+            Kind::I8 => "int8",
+            Kind::U8 => "uint8",
+            Kind::I16 => "int16",
+            Kind::U16 => "uint16",
+            Kind::I32 => "int32",
+            Kind::U32 => "uint32",
+            Kind::I64 => "int64",
+            Kind::U64 => "uint64",
+        }
+    }
+
     /// Bytes of one number.
     pub(super) fn size(self) -> usize {
         match self {

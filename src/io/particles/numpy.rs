@@ -1,6 +1,8 @@
 //! NumPy arrays and archives (`.npy`, `.npz`): the archives by npyz.
 
-use std::io::{Cursor, Read};
+#[cfg(feature = "study")]
+use std::io::Cursor;
+use std::io::{Read, Seek, SeekFrom};
 
 use glam::{DMat3, DVec3};
 use npyz::npz::NpzArchive;
@@ -9,7 +11,7 @@ use npyz::npz::NpzArchive;
 use super::Triples;
 use super::numbers::Decoder;
 use super::numpy_header::{self, Header};
-use super::source::{Source, find};
+use super::source::{Input, Source, find};
 use super::{At, ParticleFile, ReadError};
 use crate::io::budget::Metered;
 use crate::io::quote::list;
@@ -20,6 +22,8 @@ const POSITIONS: [&str; 6] = ["position", "positions", "pos", "center", "centers
 /// Bytes of the end of a zip directory without its comment, and of the 64-bit end's locator.
 const END: usize = 22;
 const LOCATOR: usize = 20;
+/// Bytes that are searched for the 64-bit end from where its locator says on.
+const SEARCHED: usize = 1 << 20;
 /// Bytes that an entry of a zip directory takes at least.
 const LEAST_ENTRY: u64 = 46;
 
@@ -27,19 +31,21 @@ const LEAST_ENTRY: u64 = 46;
 const PART: usize = 1 << 16;
 
 /// Reads an array N x 3.
-pub(super) fn read_npy(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let mut rest = source.bytes;
-    let positions = Array::open(source, "array", &mut rest)?.positions(source)?;
-    if !rest.is_empty() {
-        let at = At::Byte((source.bytes.len() - rest.len()) as u64);
-        return Err(source.malformed(at, format!("{} bytes after the array's end", rest.len())));
+pub(super) fn read_npy(source: &Source<'_>, mut input: &mut dyn Input) -> Result<ParticleFile, ReadError> {
+    source.note(|notes| notes.format = "NumPy array".into());
+    let positions = Array::open(source, "array", &mut input)?.positions(source)?;
+    let rest = std::io::copy(input, &mut std::io::sink()).map_err(|error| source.broken("array", error))?;
+    if rest > 0 {
+        let at = At::Byte(source.size.saturating_sub(rest));
+        return Err(source.malformed(at, format!("{rest} bytes after the array's end")));
     }
     Ok(ParticleFile { positions, ..ParticleFile::default() })
 }
 
 /// Reads the arrays this crate knows of an archive, compressed or not.
-pub(super) fn read_npz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let (mut archive, names) = open(source)?;
+pub(super) fn read_npz(source: &Source<'_>, input: &mut dyn Input) -> Result<ParticleFile, ReadError> {
+    let (mut archive, names) = open(source, input)?;
+    source.note(|notes| notes.format = "NumPy archive".into());
     let Some(position) = POSITIONS.iter().find(|name| names.iter().any(|known| known == *name)) else {
         let found = format!("arrays {}", list(names.iter().map(String::as_str)));
         return Err(source.no_positions("an array named `position` or `points` expected", found));
@@ -53,7 +59,8 @@ pub(super) fn read_npz(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let classes = entry(source, &mut archive, &names, "class", |array| array.classes(source))?;
     let velocities = entry(source, &mut archive, &names, "velocity", |array| array.positions(source))?;
     let axes = entry(source, &mut archive, &names, "axes", |array| array.axes(source))?;
-    Ok(ParticleFile { positions, radius, support, classes, velocities, axes })
+    let ids = entry(source, &mut archive, &names, "id", |array| array.ids(source))?.flatten();
+    Ok(ParticleFile { positions, radius, support, classes, velocities, ids, axes })
 }
 
 /// The shape and the values of one array, which is in C order.
@@ -68,13 +75,15 @@ pub(super) fn read_values(source: &Source<'_>) -> Result<(Vec<u64>, Vec<f64>), R
     Ok((shape, array.numbers(source)?))
 }
 
-type Archive<'a> = NpzArchive<Cursor<&'a [u8]>>;
-
 /// An archive, and the names of its arrays.
-fn open<'a>(source: &Source<'a>) -> Result<(Archive<'a>, Vec<String>), ReadError> {
-    check_directory(source)?;
+fn open<R: Read + Seek>(source: &Source<'_>, mut input: R) -> Result<(NpzArchive<R>, Vec<String>), ReadError> {
     let broken = |error: std::io::Error| source.broken("archive", error);
-    let mut archive = NpzArchive::new(Cursor::new(source.bytes)).map_err(broken)?;
+    let promised = promised(source, &mut input).map_err(broken)?;
+    if let Some(promised) = promised.filter(|promised| *promised > source.size / LEAST_ENTRY) {
+        let detail = format!("archive: it promises {promised} arrays, and is too short for them");
+        return Err(source.malformed(At::Unknown, detail));
+    }
+    let mut archive = NpzArchive::new(input).map_err(broken)?;
     let mut names: Vec<String> = archive.array_names().map(str::to_owned).collect();
     names.sort_unstable();
     let zip = archive.zip_archive();
@@ -87,15 +96,15 @@ fn open<'a>(source: &Source<'a>) -> Result<(Archive<'a>, Vec<String>), ReadError
 /// Arrays N x 3 of an archive by their names.
 #[cfg(feature = "study")]
 pub(super) fn read_triples(source: &Source<'_>, wanted: &[&str]) -> Result<Triples, ReadError> {
-    let (mut archive, names) = open(source)?;
+    let (mut archive, names) = open(source, Cursor::new(source.bytes))?;
     let arrays = wanted.iter().map(|name| entry(source, &mut archive, &names, name, |array| array.positions(source)));
     Ok(Triples { arrays: arrays.collect::<Result<_, _>>()?, names })
 }
 
 /// What `read` makes of the array `name`, if the archive has it. Nothing is unpacked that is not decoded at once.
-fn entry<T>(
+fn entry<T, R: Read + Seek>(
     source: &Source<'_>,
-    archive: &mut Archive<'_>,
+    archive: &mut NpzArchive<R>,
     names: &[String],
     name: &str,
     read: impl FnOnce(Array<'_>) -> Result<T, ReadError>,
@@ -106,6 +115,9 @@ fn entry<T>(
     let what = format!("array `{name}`");
     let entry = archive.zip_archive().by_name(&format!("{name}.npy"));
     let inner = entry.map_err(|error| source.broken(&what, std::io::Error::other(error)))?;
+    if inner.compression() != npyz::zip::CompressionMethod::Stored {
+        source.note(|notes| notes.compression = Some("deflate".into()));
+    }
     let mut stream = Metered { inner, ledger: source.ledger, what: &what };
     let value = read(Array::open(source, name, &mut stream)?)?;
     // The archive's checksum is looked at where the entry ends.
@@ -116,26 +128,27 @@ fn entry<T>(
     }
 }
 
-/// The zip crate allocates for as many entries as the end of the directory promises; 64 bits can promise too many.
-fn check_directory(source: &Source<'_>) -> Result<(), ReadError> {
-    let bytes = source.bytes;
+/// Entries that a 64-bit end of the directory promises. The zip crate allocates for as many; 64 bits can promise too many.
+fn promised(source: &Source<'_>, input: &mut (impl Read + Seek)) -> std::io::Result<Option<u64>> {
+    let mut from = |at: u64, most: usize| {
+        let mut bytes = Vec::new();
+        input.seek(SeekFrom::Start(at))?;
+        input.take(most as u64).read_to_end(&mut bytes)?;
+        Ok::<_, std::io::Error>(bytes)
+    };
     // The end of the directory, before a comment; a locator before it, if there is a 64-bit end somewhere before that.
-    let tail = bytes.len().saturating_sub(END + usize::from(u16::MAX));
-    let end = bytes[tail..].windows(4).rposition(|window| window == b"PK\x05\x06").map(|at| tail + at);
-    let locator =
-        end.and_then(|end| bytes.get(end.checked_sub(LOCATOR)?..end)).filter(|l| l.starts_with(b"PK\x06\x07"));
-    let promised = locator.and_then(|locator| {
-        let nominal = usize::try_from(u64::from_le_bytes(locator[8..16].try_into().ok()?)).ok()?;
-        let from = bytes.get(nominal..)?;
-        let end = &from[find(from, b"PK\x06\x06")?..];
-        Some(u64::from_le_bytes(end.get(32..40)?.try_into().ok()?))
-    });
-    match promised {
-        Some(promised) if promised > bytes.len() as u64 / LEAST_ENTRY => {
-            let detail = format!("archive: it promises {promised} arrays, and is too short for them");
-            Err(source.malformed(At::Unknown, detail))
-        }
-        _ => Ok(()),
+    let tail = LOCATOR + END + usize::from(u16::MAX);
+    let bytes = from(source.size.saturating_sub(tail as u64), tail)?;
+    let end = bytes.windows(4).rposition(|window| window == b"PK\x05\x06");
+    let locator = end.and_then(|end| bytes.get(end.checked_sub(LOCATOR)?..end));
+    let nominal = locator.filter(|l| l.starts_with(b"PK\x06\x07")).and_then(|l| l[8..16].try_into().ok());
+    let Some(nominal) = nominal.map(u64::from_le_bytes) else { return Ok(None) };
+    let bytes = from(nominal, SEARCHED)?;
+    let end = find(&bytes, b"PK\x06\x06").and_then(|at| bytes.get(at + 32..at + 40)?.try_into().ok());
+    match end {
+        Some(end) => Ok(Some(u64::from_le_bytes(end))),
+        // There is none, or nobody knows what the zip crate would find.
+        None => Err(std::io::Error::other("the end of its directory is not where it says")),
     }
 }
 
@@ -148,7 +161,10 @@ struct Array<'a> {
 
 impl<'a> Array<'a> {
     fn open(source: &Source<'_>, name: &'a str, stream: &'a mut dyn Read) -> Result<Self, ReadError> {
-        Ok(Array { name, header: numpy_header::read(source, name, stream)?, stream })
+        let header = numpy_header::read(source, name, stream)?;
+        let components = header.shape.iter().skip(1).fold(1_u64, |all, n| all.saturating_mul(*n));
+        source.note_array(name, header.kind.name(), components);
+        Ok(Array { name, header, stream })
     }
 
     fn wrong_shape(&self, source: &Source<'_>, expected: &'static str) -> ReadError {
@@ -176,6 +192,19 @@ impl<'a> Array<'a> {
         let mut classes = self.filled(source, n, 0_u8)?;
         self.read(source, n as usize, |i, v| source.class(v, i).map(|class| classes[i] = class))?;
         Ok(classes)
+    }
+
+    /// Nothing where they are no whole numbers.
+    fn ids(self, source: &Source<'_>) -> Result<Option<Vec<u64>>, ReadError> {
+        let ([n] | [n, 1]) = self.header.shape[..] else {
+            return Err(self.wrong_shape(source, "N integers"));
+        };
+        let mut ids = source.ids(n)?;
+        self.read(source, n as usize, |_, v| {
+            ids.push(v);
+            Ok(())
+        })?;
+        Ok(ids.finish())
     }
 
     fn axes(self, source: &Source<'_>) -> Result<Vec<DMat3>, ReadError> {

@@ -14,6 +14,12 @@ use crate::io::quote::{list, quote};
 /// that do not end where the header says are noticed.
 pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let header = ply_header::read(source)?;
+    let encoding = match header.encoding {
+        Encoding::Ascii => "ASCII",
+        Encoding::Binary { big_endian: true } => "binary, big-endian",
+        Encoding::Binary { big_endian: false } => "binary, little-endian",
+    };
+    source.note(|notes| notes.format = format!("PLY, {encoding}"));
     let mut body = match header.encoding {
         Encoding::Ascii => {
             let lines = text::lines(&source.bytes[header.body..]);
@@ -62,7 +68,11 @@ fn vertices(source: &Source<'_>, element: &Element, body: &mut Body<'_>) -> Resu
         let found = list(element.properties.iter().map(|p| p.name.as_str()));
         return Err(source.no_positions("vertex properties x, y, z expected", found));
     };
-    let class = element.scalar("class");
+    for property in &element.properties {
+        source.note_array(&property.name, property.kind.name(), 1);
+    }
+    let (class, id) = (element.scalar("class"), element.scalar("id"));
+    let mut ids = source.ids(if id.is_some() { element.count } else { 0 })?;
     let mut positions = source.room(element.count, "positions")?;
     let mut classes = source.room(if class.is_some() { element.count } else { 0 }, "classes")?;
     let velocity = match ["vx", "vy", "vz"].map(|axis| element.scalar(axis)) {
@@ -75,12 +85,14 @@ fn vertices(source: &Source<'_>, element: &Element, body: &mut Body<'_>) -> Resu
         body.entry(source, &element.name, &element.properties, &mut values)?;
         positions.push(DVec3::new(values[x], values[y], values[z]));
         velocities.extend(velocity.map(|columns| DVec3::from_array(columns.map(|column| values[column]))));
+        id.iter().for_each(|id| ids.push(values[*id]));
         if let Some(class) = class {
             classes.push(source.class(values[class], index)?);
         }
     }
     let (classes, velocities) = (class.map(|_| classes), velocity.map(|_| velocities));
-    Ok(ParticleFile { positions, classes, velocities, ..ParticleFile::default() })
+    let ids = id.and_then(|_| ids.finish());
+    Ok(ParticleFile { positions, classes, velocities, ids, ..ParticleFile::default() })
 }
 
 /// What follows the header.

@@ -1,9 +1,11 @@
 //! A file's content, and what its readers share: errors that name it, room for what it holds, checks of its arrays.
 
+use std::io::{BufRead, Seek};
 use std::path::Path;
 
 use glam::DVec3;
 
+use super::contents::{Contents, Notes};
 use super::{At, ReadError};
 use crate::io::budget::{Ledger, OverBudget};
 use crate::io::quote;
@@ -17,14 +19,73 @@ pub(super) fn is_velocity(name: &str) -> bool {
     ["velocity", "Velocity", "velocities", "v", "U"].contains(&name)
 }
 
+/// Whether an array of one component with this name has the particles' ids.
+pub(super) fn is_id(name: &str) -> bool {
+    let name = name.replace(['_', ' '], "").to_ascii_lowercase();
+    ["id", "ids", "idp", "particleid", "particleids"].contains(&name.as_str())
+}
+
+/// The whole number that `word` is.
+pub(super) fn whole(word: &str) -> Option<u64> {
+    word.trim().parse().ok().or_else(|| whole_number(word.trim().parse().ok()?))
+}
+
+/// `value` as an id: a whole number that doubles tell from its neighbours.
+pub(super) fn whole_number(value: f64) -> Option<u64> {
+    (value >= 0.0 && value.fract() == 0.0 && value < 9007199254740992.0).then_some(value as u64)
+}
+
+/// Ids as they are read. An array of such a name may be something else: then there are none.
+pub(super) struct Ids {
+    ids: Vec<u64>,
+    whole: bool,
+}
+
+impl Ids {
+    pub(super) fn push(&mut self, value: f64) {
+        match whole_number(value) {
+            Some(id) if self.whole => self.ids.push(id),
+            _ => self.whole = false,
+        }
+    }
+
+    /// Makes room that was asked for before.
+    pub(super) fn reserve(&mut self, count: usize) {
+        self.ids.reserve(count);
+    }
+
+    pub(super) fn finish(self) -> Option<Vec<u64>> {
+        self.whole.then_some(self.ids)
+    }
+}
+
+/// What is read in parts: a file, or bytes that are held.
+pub(super) trait Input: BufRead + Seek {}
+
+impl<T: BufRead + Seek> Input for T {}
+
 /// A file's content, its path for error messages, and what reading it took so far.
 pub(super) struct Source<'a> {
     pub(super) path: &'a Path,
+    /// None where it is read from a stream.
     pub(super) bytes: &'a [u8],
+    /// Bytes of the file, whether or not they are held.
+    pub(super) size: u64,
     pub(super) ledger: &'a Ledger,
+    pub(super) notes: &'a Notes,
 }
 
 impl Source<'_> {
+    /// Notes what the file says of itself, where somebody asks.
+    pub(super) fn note(&self, note: impl FnOnce(&mut Contents)) {
+        self.notes.note(note);
+    }
+
+    /// Notes an array of particles.
+    pub(super) fn note_array(&self, name: &str, kind: &str, components: u64) {
+        self.notes.array(name, kind, components);
+    }
+
     pub(super) fn malformed(&self, at: At, detail: impl AsRef<str>) -> ReadError {
         self.malformed_but(at, detail, "it may be truncated or corrupt: copy or export it again")
     }
@@ -48,6 +109,14 @@ impl Source<'_> {
         ReadError::TooLarge { path: self.path.into(), source }
     }
 
+    /// For what asks for more than is left without saying how much.
+    pub(super) fn no_room(&self, what: &str) -> ReadError {
+        match self.ledger.hold_all(self.ledger.left() + 1, 1, what) {
+            Err(over) => self.too_large(over),
+            Ok(()) => self.malformed(At::Unknown, format!("{what} takes more memory than there can be")),
+        }
+    }
+
     pub(super) fn no_positions(&self, wanted: &'static str, found: impl AsRef<str>) -> ReadError {
         ReadError::NoPositions { path: self.path.into(), wanted, found: quote::cut(found.as_ref(), DETAIL) }
     }
@@ -66,6 +135,11 @@ impl Source<'_> {
     /// Notes work that is as much as unpacking so many bytes.
     pub(super) fn unpack(&self, bytes: u64, what: &str) -> Result<(), ReadError> {
         self.ledger.unpack(bytes, what).map_err(|over| self.too_large(over))
+    }
+
+    /// Room for so many ids.
+    pub(super) fn ids(&self, count: u64) -> Result<Ids, ReadError> {
+        Ok(Ids { ids: self.room(count, "ids")?, whole: true })
     }
 
     /// Room for so many more positions, read number by number.

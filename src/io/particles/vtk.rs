@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::numbers::Kind;
-use super::source::{Source, find, is_velocity};
+use super::source::{Source, find, is_id, is_velocity};
 use super::vtk_sections::{Sections, legacy};
 use super::{At, ParticleFile, ReadError};
 use crate::io::quote::quote;
@@ -26,6 +26,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     if !ascii && kind != "BINARY" {
         return Err(source.malformed(At::Line(3), "`ASCII` or `BINARY` expected"));
     }
+    source.note(|notes| notes.format = format!("legacy VTK, {kind}"));
     let sections = Sections { source, at: at.min(source.bytes.len()), ascii };
     Walk {
         sections,
@@ -33,6 +34,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
         positions: None,
         classes: None,
         velocities: None,
+        ids: None,
         after_points: false,
         of: Of::Set,
         tuples: 0,
@@ -55,6 +57,7 @@ struct Walk<'a> {
     positions: Option<Vec<DVec3>>,
     classes: Option<Vec<u8>>,
     velocities: Option<Vec<DVec3>>,
+    ids: Option<Vec<u64>>,
     /// Whether POINTS came last.
     after_points: bool,
     of: Of,
@@ -78,7 +81,8 @@ impl Walk<'_> {
             return Err(self.sections.source.no_positions("POINTS expected", found));
         };
         let (classes, velocities) = (self.classes, self.velocities);
-        Ok(ParticleFile { positions, classes, velocities, ..ParticleFile::default() })
+        self.sections.source.note(|notes| notes.format += &format!(", {}", quote(&self.data_set)));
+        Ok(ParticleFile { positions, classes, velocities, ids: self.ids, ..ParticleFile::default() })
     }
 
     /// Reads or passes over the section that begins with `line`; `false` where it is unknown and so the last that is looked at.
@@ -105,6 +109,7 @@ impl Walk<'_> {
                     let found = format!("of type `{}`", quote(&kind));
                     return Err(source.wrong_shape("POINTS", found, "float, double or integers of a known size"));
                 }
+                source.note_array("points", &kind, 3);
                 self.positions = Some(self.sections.points(number(1)?, &kind)?.finish());
             }
             "CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS" => {
@@ -209,6 +214,21 @@ impl Walk<'_> {
         let count = components.saturating_mul(tuples);
         // How long numbers of an unknown type are is not known.
         let known = self.sections.ascii || legacy(kind).is_some();
+        if self.of == Of::Points {
+            self.sections.source.note_array(name, kind, components);
+        }
+        if self.of == Of::Set && name == "TimeValue" && count == 1 && known {
+            let mut time = None;
+            self.sections.numbers(name, kind, 1, |v| time = Some(v))?;
+            self.sections.source.note(|notes| notes.time = time);
+            return Ok(());
+        }
+        if is_id(name) && self.of == Of::Points && components == 1 && known && self.ids.is_none() {
+            let mut ids = self.sections.source.ids(tuples.min(self.sections.source.bytes.len() as u64))?;
+            self.sections.numbers(name, kind, tuples, |v| ids.push(v))?;
+            self.ids = ids.finish();
+            return Ok(());
+        }
         if is_velocity(name) && self.of == Of::Points && components == 3 && known {
             return self.velocities(name, kind, tuples);
         }

@@ -8,7 +8,9 @@ use std::borrow::Cow;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use super::source::{Source, Triples, find, is_velocity};
+use super::numbers::Kind;
+use super::source::{Ids, Source, Triples, find, is_id, is_velocity};
+use super::vtk_xml_blocks::Codec;
 use super::vtk_xml_data::{Array, Encoding};
 use super::{At, ParticleFile, ReadError};
 use crate::io::quote::quote;
@@ -34,6 +36,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let mut reader = Reader::from_reader(text);
     let mut pieces = Pieces::default();
     let (mut section, mut data_set) = (Vec::new(), String::new());
+    let mut formats: Vec<String> = Vec::new();
     loop {
         let at = At::Byte(reader.buffer_position());
         let event = reader.read_event().map_err(|error| source.malformed(at, xml(&error)))?;
@@ -60,21 +63,34 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
                 let count = count.trim().parse();
                 pieces.begin(source, at, count.map_err(|_| source.malformed(at, "a Piece without NumberOfPoints"))?)?;
             }
-            name @ (b"Points" | b"PointData") if !empty => section = name.to_vec(),
+            name @ (b"Points" | b"PointData" | b"FieldData") if !empty => section = name.to_vec(),
             b"DataArray" => {
                 let name = attribute("Name")?.unwrap_or_default();
                 let stated = attribute("NumberOfComponents")?.unwrap_or_else(|| "1".into());
+                let (data_type, format) = (attribute("type")?, attribute("format")?);
+                let (scalar, numeric) = (stated.trim() == "1", data_type.as_deref().and_then(Kind::named).is_some());
+                if section != b"FieldData" && !section.is_empty() && pieces.number == 1 {
+                    let kind = data_type.as_deref().unwrap_or_default();
+                    source.note_array(&name, kind, stated.trim().parse().unwrap_or(1));
+                    formats.push(format.clone().unwrap_or_default().to_ascii_lowercase());
+                }
                 let what = match section.as_slice() {
                     b"Points" => What::Positions,
                     b"PointData" if name == "class" => What::Classes,
                     b"PointData" if is_velocity(&name) && stated.trim() == "3" => What::Velocities,
+                    b"PointData" if is_id(&name) && scalar && numeric && !pieces.has_ids => What::Ids,
+                    b"PointData" if name == "vtkGhostType" && scalar && numeric => What::Ghosts,
+                    b"FieldData" if name == "TimeValue" && scalar && numeric => What::Time,
                     _ => continue,
                 };
-                let (array, components) = if what == What::Classes { ("class", "1") } else { ("Points", "3") };
-                if stated.trim() != components {
+                let needed = match what {
+                    What::Positions => Some(("Points", "3")),
+                    What::Classes => Some(("class", "1")),
+                    _ => None,
+                };
+                if let Some((array, components)) = needed.filter(|(_, components)| stated.trim() != *components) {
                     return Err(source.wrong_shape(array, format!("of {} components", quote(&stated)), components));
                 }
-                let (data_type, format) = (attribute("type")?, attribute("format")?);
                 let offset = attribute("offset")?.and_then(|offset| offset.trim().parse().ok());
                 let text = if empty { Cow::Borrowed(&[][..]) } else { content(source, &mut reader)? };
                 let array = Array {
@@ -82,25 +98,58 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
                     data_type: data_type.unwrap_or_default(),
                     format: format.unwrap_or_default(),
                     offset: offset.unwrap_or(0),
-                    count: if what == What::Classes { pieces.points } else { pieces.points.saturating_mul(3) },
+                    count: match what {
+                        What::Positions | What::Velocities => pieces.points.saturating_mul(3),
+                        What::Classes | What::Ids | What::Ghosts => pieces.points,
+                        What::Time => 1,
+                    },
                     text: text.trim_ascii(),
                 };
                 match what {
                     What::Positions => pieces.positions(source, &array, &encoding)?,
                     What::Classes => pieces.classes(source, &array, &encoding)?,
                     What::Velocities => pieces.velocities(source, &name, &array, &encoding)?,
+                    What::Ids => pieces.ids(source, &array, &encoding)?,
+                    What::Ghosts => pieces.ghosts(source, &array, &encoding)?,
+                    What::Time => {
+                        let mut time = None;
+                        array.values(source, &encoding, |v| time = Some(v))?;
+                        source.note(|notes| notes.time = time);
+                    }
                 }
             }
             _ => {}
         }
     }
     pieces.end(source, At::Byte(text.len() as u64))?;
+    source.note(|notes| {
+        notes.format = format!("VTK XML {}, {}", quote(&data_set), stored(&formats, encoding.appended_base64));
+        notes.compression =
+            encoding.compressor.as_deref().map(|name| Codec::named(name).map_or("", Codec::name).into());
+    });
     let Some(positions) = pieces.positions else {
         let found = format!("data set `{}` without", quote(&data_set));
         return Err(source.no_positions("a DataArray in Points expected", found));
     };
     let (positions, velocities) = (positions.finish(), pieces.velocities.map(Triples::finish));
-    Ok(ParticleFile { positions, classes: pieces.classes, velocities, ..ParticleFile::default() })
+    let ids = pieces.ids.and_then(Ids::finish);
+    let mut file = ParticleFile { positions, classes: pieces.classes, velocities, ids, ..ParticleFile::default() };
+    if pieces.ghosts.contains(&true) {
+        // Where lists are not as long as positions it is refused later.
+        file.retain(|index| !pieces.ghosts.get(index).is_some_and(|ghost| *ghost));
+    }
+    Ok(file)
+}
+
+/// How arrays are stored: what is not written out in text is in base64 or raw.
+fn stored(formats: &[String], base64: bool) -> &'static str {
+    let has = |format: &str| formats.iter().any(|f| f == format);
+    match (has("appended"), has("binary")) {
+        (true, _) if base64 => "appended in base64",
+        (true, _) => "appended raw",
+        (false, true) => "inline in base64",
+        (false, false) => "ASCII",
+    }
 }
 
 /// What an array holds that is read.
@@ -109,7 +158,13 @@ enum What {
     Positions,
     Classes,
     Velocities,
+    Ids,
+    Ghosts,
+    Time,
 }
+
+/// Points of another piece (bit 0) or hidden ones (bit 1), by vtkGhostType.
+const GHOST: u8 = 3;
 
 /// The pieces of the data set so far: each brings its points once.
 #[derive(Default)]
@@ -117,18 +172,27 @@ struct Pieces {
     positions: Option<Triples>,
     classes: Option<Vec<u8>>,
     velocities: Option<Triples>,
-    /// Points of the current piece, and whether they, their classes and their velocities were read.
+    ids: Option<Ids>,
+    /// For each point so far whether it belongs to another piece; shorter where no piece says so.
+    ghosts: Vec<bool>,
+    /// Pieces so far, and points of those before the current one.
+    number: usize,
+    before: usize,
+    /// Points of the current piece, and whether they, their classes, velocities and ids were read.
     points: usize,
     has_positions: bool,
     has_classes: bool,
     has_velocities: bool,
+    has_ids: bool,
 }
 
 impl Pieces {
     fn begin(&mut self, source: &Source<'_>, at: At, points: usize) -> Result<(), ReadError> {
         self.end(source, at)?;
+        self.before = self.before.saturating_add(self.points);
         self.points = points;
-        (self.has_positions, self.has_classes, self.has_velocities) = (false, false, false);
+        self.number += 1;
+        (self.has_positions, self.has_classes, self.has_velocities, self.has_ids) = (false, false, false, false);
         Ok(())
     }
 
@@ -164,6 +228,23 @@ impl Pieces {
         let all = self.velocities.get_or_insert(more);
         all.reserve(self.points);
         array.values(source, encoding, |v| all.push(v))
+    }
+
+    fn ids(&mut self, source: &Source<'_>, array: &Array<'_>, encoding: &Encoding<'_>) -> Result<(), ReadError> {
+        self.has_ids = true;
+        let more = source.ids(self.points as u64)?;
+        let all = self.ids.get_or_insert(more);
+        all.reserve(self.points);
+        array.values(source, encoding, |v| all.push(v))
+    }
+
+    fn ghosts(&mut self, source: &Source<'_>, array: &Array<'_>, encoding: &Encoding<'_>) -> Result<(), ReadError> {
+        let (from, to) = (self.before, self.before.saturating_add(self.points));
+        let more: Vec<bool> = source.room(to.saturating_sub(self.ghosts.len()) as u64, "ghosts")?;
+        drop(more);
+        self.ghosts.resize(to, false);
+        let mut each = self.ghosts[from..].iter_mut();
+        array.values(source, encoding, |v| each.next().into_iter().for_each(|ghost| *ghost = v as u8 & GHOST != 0))
     }
 
     fn classes(&mut self, source: &Source<'_>, array: &Array<'_>, encoding: &Encoding<'_>) -> Result<(), ReadError> {
@@ -212,12 +293,17 @@ fn content<'a>(source: &Source<'_>, reader: &mut Reader<&'a [u8]>) -> Result<Cow
     }
 }
 
-fn xml(error: &dyn std::fmt::Display) -> String {
+pub(super) fn xml(error: &dyn std::fmt::Display) -> String {
     format!("XML error: {}", quote(&error.to_string()))
 }
 
 /// The value of the attribute `name`. The library's own check for repetitions takes time with the square of their number.
-fn attribute(source: &Source<'_>, at: At, tag: &BytesStart<'_>, name: &str) -> Result<Option<String>, ReadError> {
+pub(super) fn attribute(
+    source: &Source<'_>,
+    at: At,
+    tag: &BytesStart<'_>,
+    name: &str,
+) -> Result<Option<String>, ReadError> {
     let mut found = None;
     for attribute in tag.attributes().with_checks(false) {
         let attribute = attribute.map_err(|error| source.malformed(at, xml(&error)))?;

@@ -1,22 +1,16 @@
-//! The arrays of VTK XML files: text, base64 or raw bytes, plain or in zlib blocks.
-
-use std::io::Read;
+//! The arrays of VTK XML files: text, base64 or raw bytes, plain or in compressed blocks.
 
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use flate2::bufread::ZlibDecoder;
 
 use super::numbers::{Decoder, Kind};
 use super::source::Source;
+use super::vtk_xml_blocks::{Blocks, Codec};
 use super::{At, ReadError};
-use crate::io::budget::Metered;
 use crate::io::quote::quote;
 
-/// Bytes that are unpacked at a time.
+/// Letters that are decoded at a time, a multiple of four.
 const PART: usize = 1 << 16;
-
-/// Beginning with a block takes about as long as unpacking so many bytes.
-const BEGIN: u64 = 4096;
 
 /// How the file stores its arrays.
 #[derive(Default)]
@@ -109,13 +103,25 @@ impl Array<'_> {
             None | Some("") => {
                 let length = words(&take(0, word)?)[0];
                 if base64 {
-                    let bytes = take(0, word.saturating_add(length))?;
-                    decoder.feed(&bytes[word..], each);
+                    // Header and data are encoded together; a part of whole groups of letters is whole bytes.
+                    let all = word.saturating_add(length);
+                    let (mut skip, mut left) = (word, all);
+                    for letters in part(data, 0, all, true).map_err(bad)?.chunks(PART) {
+                        let whole = left.min(letters.len() / 4 * 3);
+                        let bytes = unpack(letters, whole, true, Vec::new()).map_err(bad)?;
+                        left -= bytes.len();
+                        decoder.feed(&bytes[skip.min(bytes.len())..], &mut *each);
+                        skip = skip.saturating_sub(bytes.len());
+                    }
                 } else {
                     decoder.feed(part(data, word, length, false).map_err(bad)?, each);
                 }
             }
-            Some("vtkZLibDataCompressor") => {
+            Some(name) => {
+                let codec = Codec::named(name).ok_or_else(|| {
+                    let detail = format!("compressor `{}` is not known", quote(name));
+                    source.malformed_but(self.at, detail, "save with zlib, LZ4, LZMA or without compression")
+                })?;
                 // [blocks][block size][last block's size, 0 if it is full][compressed size of each], then the blocks.
                 let head = words(&take(0, 3 * word)?);
                 let header_length = head[0].saturating_add(3).saturating_mul(word);
@@ -129,36 +135,13 @@ impl Array<'_> {
                     }
                     false => part(data, header_length, total, false).map_err(bad)?,
                 };
-                let mut buffer = vec![0; PART];
-                let mut zlib = ZlibDecoder::new(&[][..]);
+                let mut blocks = Blocks::new(codec, source);
                 for (i, size) in sizes.iter().enumerate() {
                     let (block, after) = rest.split_at(*size);
                     rest = after;
                     let full = if i + 1 == head[0] && head[2] != 0 { head[2] } else { head[1] };
-                    zlib.reset(block);
-                    source.unpack(BEGIN, "unpacked blocks")?;
-                    let inner = &mut zlib;
-                    let mut stream =
-                        Metered { inner, ledger: source.ledger, what: "unpacked blocks" }.take(full as u64);
-                    let mut unpacked = 0;
-                    loop {
-                        match stream.read(&mut buffer) {
-                            Ok(0) => break,
-                            Ok(length) => {
-                                decoder.feed(&buffer[..length], &mut *each);
-                                unpacked += length;
-                            }
-                            Err(error) => return Err(source.broken(&format!("compressed block {i}"), error)),
-                        }
-                    }
-                    if unpacked != full {
-                        return Err(bad(format!("compressed block {i} has {unpacked} bytes, {full} promised")));
-                    }
+                    blocks.unpack(i, block, full, |bytes| decoder.feed(bytes, &mut *each))?;
                 }
-            }
-            Some(other) => {
-                let detail = format!("compressor `{}` is not known", quote(other));
-                return Err(source.malformed_but(self.at, detail, "save with zlib or without compression"));
             }
         }
         match decoder.left() {

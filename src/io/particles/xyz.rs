@@ -1,7 +1,9 @@
 //! `.xyz`: raw float32, or lines of text.
 
+use std::io::{Read, SeekFrom};
+
 use super::numbers::{Decoder, Kind};
-use super::source::Source;
+use super::source::{Input, Source};
 use super::text::{self, CommaCheck};
 use super::{At, ParticleFile, ReadError};
 use crate::io::quote::quote;
@@ -9,20 +11,49 @@ use crate::io::quote::quote;
 /// A line of more words is no table's: likely the whole file is one line.
 const COLUMNS: usize = 64;
 
+/// Bytes by which text is told from packed numbers; bytes that are decoded at a time.
+const HEAD: u64 = 4096;
+const PART: usize = 1 << 16;
+
 /// Reads little-endian float32 triples; or, if the file starts as text does, [`lines`].
-pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
-    let content = text::content(source)?;
-    if text::is_text(content) {
+pub(super) fn read(source: &Source<'_>, input: &mut dyn Input) -> Result<ParticleFile, ReadError> {
+    let broken = |error: std::io::Error| source.broken("reading", error);
+    let mut head = Vec::new();
+    (&mut *input).take(HEAD).read_to_end(&mut head).map_err(broken)?;
+    input.seek(SeekFrom::Start(0)).map_err(broken)?;
+    let text = text::is_text(text::content(&Source { bytes: &head, ..*source })?);
+    drop(head);
+    if text {
+        let mut whole = source.room(if source.bytes.is_empty() { source.size } else { 0 }, "the file")?;
+        if source.bytes.is_empty() {
+            input.take(source.size).read_to_end(&mut whole).map_err(broken)?;
+        }
+        let source = &Source { bytes: if source.bytes.is_empty() { &whole } else { source.bytes }, ..*source };
+        let content = text::content(source)?;
+        source.note(|notes| notes.format = "XYZ, text".into());
         return lines(source, content);
     }
-    let rest = source.bytes.len() % 12;
+    let rest = source.size % 12;
     if rest != 0 {
-        let at = At::Byte((source.bytes.len() - rest) as u64);
+        let at = At::Byte(source.size - rest);
         return Err(source.malformed(at, format!("{rest} bytes left after the last whole float32 triple")));
     }
-    let mut triples = source.triples(source.bytes.len() as u64 / 12)?;
-    Decoder::new(Kind::F32, false).feed(source.bytes, |v| triples.push(v));
-    Ok(ParticleFile { positions: triples.finish(), ..ParticleFile::default() })
+    source.note(|notes| notes.format = "XYZ, raw".into());
+    source.note_array("position", "float32", 3);
+    let mut triples = source.triples(source.size / 12)?;
+    let (mut decoder, mut part) = (Decoder::new(Kind::F32, false), vec![0; PART]);
+    let mut input = input.take(source.size);
+    loop {
+        match input.read(&mut part).map_err(broken)? {
+            0 => break,
+            length => decoder.feed(&part[..length], |v| triples.push(v)),
+        }
+    }
+    let positions = triples.finish();
+    if positions.len() as u64 != source.size / 12 {
+        return Err(source.malformed(At::Unknown, "the file became shorter while it was read"));
+    }
+    Ok(ParticleFile { positions, ..ParticleFile::default() })
 }
 
 /// Lines `x y z ...`, all with as many words, or, as in chemistry, `element x y z ...`, separated by blanks or commas; `#`

@@ -121,6 +121,7 @@ pub fn between(
         radius: nearer.radius,
         support: nearer.support,
         classes: nearer.classes.clone(),
+        ids: nearer.ids.clone(),
         axes: nearer.axes.clone(),
     })
 }

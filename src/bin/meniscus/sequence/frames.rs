@@ -1,6 +1,10 @@
 //! The frames of a simulation: which files they are, what numbers they have, which of them are wanted, and what pictures of them
 //! are called.
 
+use meniscus::io::{
+    Budget,
+    particles::{ReadError, time_steps},
+};
 use std::{
     collections::BTreeMap,
     fmt,
@@ -13,6 +17,8 @@ use std::{
 pub enum FramesError {
     #[error("{}: is no pattern of file names: {message}. Write `[*]` for a star that is meant", pattern.display())]
     Pattern { pattern: PathBuf, message: String },
+    #[error(transparent)]
+    Collection(#[from] ReadError),
     #[error("{}: cannot be looked through: {source}", path.display())]
     Folder { path: PathBuf, source: std::io::Error },
     #[error("{}: no file has such a name; check the folder, and put the pattern in quotation marks", .0.display())]
@@ -29,6 +35,14 @@ pub enum FramesError {
     Unselected { selection: Selection, first: u64, last: u64 },
     #[error("{}: name numbered pictures, `#` for each digit, such as out/####.png", .0.display())]
     NoNumber(PathBuf),
+}
+
+/// Files of a ParaView collection's time steps.
+fn named(file: &Path) -> Result<Vec<(f64, PathBuf)>, ReadError> {
+    match file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pvd")) {
+        true => time_steps(file, &Budget::default()),
+        false => Ok(Vec::new()),
+    }
 }
 
 /// One file of a simulation.
@@ -52,7 +66,10 @@ impl Frames {
         let mut files = Vec::new();
         for pattern in patterns {
             if pattern.exists() {
-                files.push(pattern.clone());
+                match named(pattern)? {
+                    steps if steps.len() > 1 => files.extend(steps.into_iter().map(|(_, file)| file)),
+                    _ => files.push(pattern.clone()),
+                }
                 continue;
             }
             let wrong = |message: String| FramesError::Pattern { pattern: pattern.clone(), message };
@@ -240,6 +257,22 @@ mod tests {
         assert!(numbers(&["f_1.vtk", "g_2.vtk"]).is_err_and(|e| e.contains("differ in more")));
         assert!(numbers(&["f_1.vtk", "f_01.vtk"]).is_err_and(|e| e.contains("both would be picture")));
         assert!(numbers(&[]).is_err());
+    }
+
+    #[test]
+    fn a_collection_of_several_times_is_its_files() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        let set = |time, name| format!("<DataSet timestep=\"{time}\" file=\"{name}\"/>");
+        let write =
+            |name, sets: String| std::fs::write(at(name), format!("<VTKFile type=\"Collection\">{sets}</VTKFile>"));
+        write("all.pvd", set(0, "a_10.vtu") + &set(1, "a_20.vtu")).expect("written");
+        write("one.pvd", set(0, "a_10.vtu")).expect("written");
+        let files = |name| Frames::find(&[at(name)]).map(|f| f.all.into_iter().map(|f| f.file).collect::<Vec<_>>());
+        assert_eq!(files("all.pvd").expect("steps"), [at("a_10.vtu"), at("a_20.vtu")]);
+        assert_eq!(files("one.pvd").expect("one"), [at("one.pvd")]);
+        std::fs::write(at("torn.pvd"), "<VTKFile").expect("written");
+        assert!(files("torn.pvd").expect_err("torn").to_string().contains("torn.pvd"));
     }
 
     #[test]

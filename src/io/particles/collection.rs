@@ -1,0 +1,208 @@
+//! Collections of VTK files (`.pvd`, `.vtm`, `.vtpd`, `.vtpc`, `.pvtu`, `.pvtp`): names of files, which are relative to
+//! themselves. What they name is read and joined.
+
+use std::path::{Path, PathBuf};
+
+use quick_xml::Reader;
+use quick_xml::events::Event;
+
+use super::contents::Notes;
+use super::source::Source;
+use super::vtk_xml::{attribute, xml};
+use super::{At, ParticleFile, ReadError, guarded, read_noting};
+use crate::io::budget::{Budget, Ledger};
+use crate::io::quote::quote;
+
+/// Collections in collections.
+const DEPTH: usize = 4;
+/// Letters of a file's name.
+const NAME: usize = 250;
+
+/// Whether files of this extension name others.
+pub(super) fn known(extension: &str) -> bool {
+    matches!(extension, "pvd" | "vtm" | "vtpd" | "vtpc" | "pvtu" | "pvtp")
+}
+
+/// A file that a collection names.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Member {
+    pub(super) file: PathBuf,
+    pub(super) time: Option<f64>,
+}
+
+/// The files that it names; paths are as they can be opened.
+fn members(source: &Source<'_>) -> Result<Vec<Member>, ReadError> {
+    if !source.bytes.trim_ascii_end().ends_with(b"</VTKFile>") {
+        return Err(source.malformed(At::Byte(source.bytes.len() as u64), "the file ends before `</VTKFile>`"));
+    }
+    let folder = source.path.parent().unwrap_or(Path::new(""));
+    let mut reader = Reader::from_reader(source.bytes);
+    let mut members: Vec<Member> = Vec::new();
+    loop {
+        let at = At::Byte(reader.buffer_position());
+        let tag = match reader.read_event().map_err(|error| source.malformed(at, xml(&error)))? {
+            Event::Eof => break,
+            Event::Start(tag) | Event::Empty(tag) => tag,
+            _ => continue,
+        };
+        let name = match tag.name().as_ref() {
+            b"VTKFile" => {
+                let kind = attribute(source, at, &tag, "type")?.unwrap_or_default();
+                source.note(|notes| notes.format = format!("VTK XML {}", quote(&kind)));
+                continue;
+            }
+            b"DataSet" => "file",
+            b"Piece" => "Source",
+            _ => continue,
+        };
+        // Blocks may be empty.
+        let Some(file) = attribute(source, at, &tag, name)?.filter(|file| !file.is_empty()) else {
+            continue;
+        };
+        if file.chars().count() > NAME {
+            return Err(source.malformed(at, format!("a file's name of more than {NAME} letters")));
+        }
+        let time = attribute(source, at, &tag, "timestep")?;
+        let time = time.map(|time| match time.trim().parse::<f64>() {
+            Ok(time) if time.is_finite() => Ok(time),
+            _ => Err(source.malformed(at, format!("`timestep` is `{}`, and no time", quote(&time)))),
+        });
+        let more: Vec<u8> = source.room((size_of::<Member>() + 4 * file.len()) as u64, "names of files")?;
+        drop(more);
+        members.push(Member { file: folder.join(file), time: time.transpose()? });
+    }
+    if members.is_empty() {
+        return Err(source.no_positions("a DataSet or Piece that names a file expected", "none"));
+    }
+    Ok(members)
+}
+
+/// The times of a collection of several, in order, each with its files.
+fn steps(members: &[Member]) -> Vec<(f64, Vec<&Path>)> {
+    let mut times: Vec<f64> = members.iter().filter_map(|member| member.time).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    let of = |time: f64| members.iter().filter(move |m| m.time == Some(time)).map(|m| m.file.as_path()).collect();
+    times.into_iter().map(|time| (time, of(time))).collect()
+}
+
+/// Reads what a collection of one time names, and joins it. `above` are the collections that name this one.
+pub(super) fn read(
+    path: &Path,
+    bytes: &[u8],
+    budget: &Budget,
+    notes: &Notes,
+    above: &[PathBuf],
+) -> Result<ParticleFile, ReadError> {
+    let members = guarded(path, bytes, budget, notes, members)?;
+    let wrong = |detail: String, remedy| ReadError::Malformed { path: path.into(), at: At::Unknown, detail, remedy };
+    let steps = steps(&members);
+    if let [(first, _), .., (last, _)] = steps[..] {
+        let (count, first, last) = (steps.len(), first, last);
+        return Err(ReadError::Steps { path: path.into(), count, first, last });
+    }
+    notes.note(|notes| notes.time = steps.first().map(|(time, _)| *time));
+    let same = |file: &Path| file.canonicalize().unwrap_or_else(|_| file.into());
+    let above = [above, &[same(path)]].concat();
+    let files: Vec<PathBuf> = members.iter().map(|member| same(&member.file)).collect();
+    let mut sorted: Vec<_> = files.iter().collect();
+    sorted.sort();
+    if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        let detail = format!("it names `{}` twice", quote(&twice[0].to_string_lossy()));
+        return Err(wrong(detail, "remove one of them, or its particles are there twice"));
+    }
+    if let Some(again) = files.iter().find(|file| above.contains(file)) {
+        let detail = format!("it names `{}`, which names it", quote(&again.to_string_lossy()));
+        return Err(wrong(detail, "name the files that hold particles"));
+    }
+    if above.len() > DEPTH {
+        return Err(wrong(format!("collections in collections, more than {DEPTH} deep"), "name one of them"));
+    }
+    let sizes = files.iter().filter_map(|file| file.metadata().ok()).map(|metadata| metadata.len());
+    let ledger = Ledger::of_parts(*budget, sizes.fold(0, u64::saturating_add));
+    let mut all: Option<ParticleFile> = None;
+    for member in &members {
+        let inner = Notes::like(notes);
+        let part = read_noting(&member.file, budget, &inner, &above)
+            .map_err(|source| ReadError::Member { path: path.into(), source: Box::new(source) })?;
+        notes.join(inner);
+        let whole = Joined { path, member: &member.file, ledger: &ledger };
+        all = Some(match all {
+            None => whole.first(part)?,
+            Some(all) => whole.join(all, part)?,
+        });
+    }
+    Ok(all.unwrap_or_default())
+}
+
+/// What joining one more file needs.
+struct Joined<'a> {
+    path: &'a Path,
+    member: &'a Path,
+    ledger: &'a Ledger,
+}
+
+impl Joined<'_> {
+    fn first(&self, part: ParticleFile) -> Result<ParticleFile, ReadError> {
+        let each = size_of::<glam::DVec3>() * (1 + usize::from(part.velocities.is_some()))
+            + usize::from(part.classes.is_some())
+            + size_of::<u64>() * usize::from(part.ids.is_some());
+        let held = self.ledger.hold_all(part.positions.len() as u64, each, "the files together");
+        held.map_err(|source| ReadError::TooLarge { path: self.path.into(), source })?;
+        Ok(part)
+    }
+
+    fn join(&self, mut all: ParticleFile, part: ParticleFile) -> Result<ParticleFile, ReadError> {
+        // Of processes without particles there may be files without arrays.
+        if part.positions.is_empty() {
+            return Ok(all);
+        }
+        let mut part = self.first(part)?;
+        if all.positions.is_empty() {
+            return Ok(part);
+        }
+        self.append("class", &mut all.classes, part.classes)?;
+        self.append("velocity", &mut all.velocities, part.velocities)?;
+        self.append("id", &mut all.ids, part.ids)?;
+        all.positions.append(&mut part.positions);
+        Ok(all)
+    }
+
+    fn append<T>(&self, array: &str, all: &mut Option<Vec<T>>, part: Option<Vec<T>>) -> Result<(), ReadError> {
+        match (all, part) {
+            (Some(all), Some(mut part)) => all.append(&mut part),
+            (None, None) => {}
+            (has, _) => {
+                let (with, without) =
+                    if has.is_some() { ("others have", "has none") } else { ("it has", "others have none") };
+                let name = quote(&self.member.to_string_lossy());
+                return Err(ReadError::Malformed {
+                    path: self.path.into(),
+                    at: At::Unknown,
+                    detail: format!("`{name}` and others cannot be joined: of `{array}` {with} one, and {without}"),
+                    remedy: "give all of them the same arrays, or name those that belong together",
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The files of a collection's time steps, each with its time, where it has several; for a sequence of pictures.
+///
+/// # Errors
+/// As [`super::read`], of the collection alone; [`ReadError::Malformed`] if a time step has several files.
+pub fn time_steps(path: &Path, budget: &Budget) -> Result<Vec<(f64, PathBuf)>, ReadError> {
+    let bytes = super::bytes(path, budget)?;
+    let members = guarded(path, &bytes, budget, &Notes::default(), members)?;
+    let one = |(time, files): (f64, Vec<&Path>)| match files[..] {
+        [file] => Ok((time, file.to_owned())),
+        _ => Err(ReadError::Malformed {
+            path: path.into(),
+            at: At::Unknown,
+            detail: format!("the time {time} has {} files", files.len()),
+            remedy: "write a .pvtu or .vtm for each time, and name those",
+        }),
+    };
+    steps(&members).into_iter().map(one).collect()
+}
