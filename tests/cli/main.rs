@@ -2,6 +2,7 @@
 
 mod bench;
 mod between;
+mod camera;
 mod drivers;
 mod films;
 mod keys;

@@ -4,6 +4,7 @@
 
 mod bench;
 mod camera;
+mod camera_file;
 #[cfg(feature = "study")]
 mod chart;
 mod choices;

@@ -48,6 +48,9 @@ pub struct Picture {
     /// Whether the absorption of the settings is meant, or is to suit the liquid's size.
     #[serde(skip)]
     pub absorption_given: bool,
+    /// Whether the size is meant, or is to be a camera file's, if there is one.
+    #[serde(skip)]
+    pub size_given: bool,
 }
 
 /// What is infinitely far away.
@@ -78,6 +81,7 @@ impl Default for Picture {
             preparation: prepare::Options::default(),
             settings: Settings::default(),
             absorption_given: false,
+            size_given: false,
         }
     }
 }
@@ -169,7 +173,7 @@ impl Picture {
     /// [`Picture::camera`] of particles relative to an origin.
     pub fn camera_of(&self, origin: DVec3, particles: &Particles) -> Result<(Camera, Vec3, View), Error> {
         let aspect = self.size[0].max(1) as f32 / self.size[1].max(1) as f32;
-        let near = 0.1 * particles.radius;
+        let near = self.camera.near.map_or(0.1 * particles.radius, |n| n as f32);
         let (mut camera, eye, view) = camera::frame(&self.camera, origin, particles, aspect, near)?;
         camera.environment_rotation = self.environment.rotation.to_radians();
         Ok((camera, eye, view))

@@ -53,7 +53,7 @@ pub struct Args {
     #[arg(long, value_name = "A-B[:STEP]", allow_hyphen_values = true)]
     pub frames: Option<Selection>,
     /// The eye goes so many degrees around the target over the sequence: 360 is once around, and the end meets the start
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with = "camera")]
     pub turn: Option<f64>,
     /// Pictures a second, of films and of the time that a scene file's keys count in
     #[arg(long, value_name = "RATE", default_value_t = 25.0, value_parser = rate)]
