@@ -78,7 +78,7 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
         method.optics.member().record(&mut plan, scene, &surfaces);
     }
     // What later passes of the host's are told of the first surface.
-    if scene.count > 0 && scene.surface_formats().next().is_some() {
+    if scene.count > 0 && (scene.surface_read || scene.surface_formats().next().is_some()) {
         plan.work_for(Home::View, "surface");
         let first = first_surface::record(&mut plan, scene, &surfaces);
         surface::record(&mut plan, scene, first);
@@ -112,6 +112,8 @@ pub(crate) struct Scene<'a> {
     pub space: Space,
     /// Whether what each walk met is written too.
     pub walks: bool,
+    /// Whether the first surface is found, for whoever reads it.
+    pub surface_read: bool,
     /// Of smoothing only so many steps, if it has more.
     pub smoothing_steps: Option<u32>,
     /// Whether the device has points larger than a pixel.
@@ -164,6 +166,7 @@ impl<'a> Scene<'a> {
             eye: Mat4::IDENTITY,
             space: Space::new(1.0, Vec3::ZERO),
             walks: false,
+            surface_read: false,
             smoothing_steps: None,
             points: limits.point_size > 1.0,
             storage_size: limits.storage_size,

@@ -158,8 +158,15 @@ impl<'a> Canvas<'a> {
 
     /// The same as RGB, of four floats a pixel.
     pub fn picture(&self) -> Result<Vec<[f32; 3]>, HostError> {
+        Ok(self.layers()?.0)
+    }
+
+    /// The same as RGB, and alpha apart from it.
+    pub fn layers(&self) -> Result<(Vec<[f32; 3]>, Vec<f32>), HostError> {
         let float = |at: &[u8]| f32::from_ne_bytes([at[0], at[1], at[2], at[3]]);
-        Ok(self.read()?.chunks_exact(16).map(|p| [float(p), float(&p[4..]), float(&p[8..])]).collect())
+        let bytes = self.read()?;
+        let pixels = bytes.chunks_exact(16);
+        Ok(pixels.map(|p| ([float(p), float(&p[4..]), float(&p[8..])], float(&p[12..]))).unzip())
     }
 }
 

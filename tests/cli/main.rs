@@ -3,6 +3,7 @@
 mod bench;
 mod between;
 mod camera;
+mod compositing;
 mod drivers;
 mod films;
 mod keys;

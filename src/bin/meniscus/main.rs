@@ -11,6 +11,7 @@ mod choices;
 mod codes;
 #[cfg(feature = "study")]
 mod compare;
+mod compositing;
 mod dump;
 mod dump_field;
 mod empty;

@@ -3,6 +3,7 @@
 use crate::{
     camera::{self, View},
     choices,
+    compositing::{Background, Channels},
     scene::{Prepare, Scene},
 };
 use glam::{DVec3, Vec3};
@@ -40,6 +41,10 @@ pub struct Picture {
     /// Decides how far an environment map is averaged down.
     #[serde(with = "amount")]
     pub max_memory: Budget,
+    /// Of pictures that are written, what is seen where there is no liquid.
+    pub background: Background,
+    /// Of pictures that are written, what they have beside colour.
+    pub channels: Channels,
     pub camera: View,
     pub environment: Environment,
     /// How classes and ellipsoids are made; a support that is not given is the file's.
@@ -76,6 +81,8 @@ impl Default for Picture {
             supersample: 1,
             size: [1024, 768],
             max_memory: Budget::default(),
+            background: Background::default(),
+            channels: Channels::default(),
             camera: View::default(),
             environment: Environment::default(),
             preparation: prepare::Options::default(),

@@ -8,7 +8,13 @@ use super::{
     frames::{Frames, FramesError, Pattern},
     kept,
 };
-use crate::{camera_file::Cameras, outputs, picture::Picture, scene::Prepare};
+use crate::{
+    camera_file::Cameras,
+    compositing::{self, Background},
+    outputs,
+    picture::Picture,
+    scene::Prepare,
+};
 use glam::{DVec3, Vec3};
 use meniscus::io::images;
 use rayon::prelude::*;
@@ -98,6 +104,7 @@ impl Plan {
                 return Err("--turn goes around a target, and a camera file has none: leave one of them out".into());
             }
             let mut picture = args.options.over_seen(base, None, Some(frame), &mut cameras.borrow_mut())?;
+            args.compositing.apply(&mut picture);
             picture.prepare.get_or_insert(Prepare::Cpu);
             Ok(picture)
         };
@@ -124,6 +131,12 @@ impl Plan {
 
         let picture = at(0.0, frames.number(0, 0.0))?;
         others.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
+        compositing::check(&picture, args.output.iter().map(PathBuf::as_path))?;
+        if let Some(film) = args.output.iter().find(|p| Kind::of(p).is_some() && picture.background == Background::None)
+        {
+            let remedy = "write numbered pictures (out/####.png), or leave out --background none";
+            return Err(format!("{}: films have no transparency: {remedy}", film.display()).into());
+        }
         check(args, &named, &others)?;
         let settled = Settled::of(&picture, &frames)?;
         // All of it over all pictures: a film that begins anew goes on turning.
