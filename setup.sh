@@ -9,6 +9,8 @@ packages=(build-essential binutils libvulkan1 mesa-vulkan-drivers vulkan-validat
           libshaderc-dev glslang-dev spirv-tools
           # For the C interface's tests: Vulkan's headers, and what finds an installed library.
           libvulkan-dev pkg-config cmake
+          # For the export script of docs/blender.md, which a test runs.
+          python3
           # What a window loads when it starts, and a display without a screen to test it in.
           libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 xvfb)
 # SwiftShader, a second Vulkan driver, comes with Debian's Chromium; Ubuntu ships that as a snap, without it.

@@ -165,18 +165,28 @@ impl Host {
 
     /// Checks that a format can be a colour attachment, with blending if that is asked for.
     pub(crate) fn check_attachment(&self, format: vk::Format, blends: bool) -> Result<(), Error> {
+        match blends {
+            true => {
+                self.check_format(format, vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND, "blended colour attachment")
+            }
+            false => self.check_format(format, vk::FormatFeatureFlags::COLOR_ATTACHMENT, "colour attachment"),
+        }
+    }
+
+    /// Checks that a format can be a depth attachment.
+    pub(crate) fn check_depth(&self, format: vk::Format) -> Result<(), Error> {
+        self.check_format(format, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT, "depth attachment")
+    }
+
+    fn check_format(&self, format: vk::Format, wanted: vk::FormatFeatureFlags, what: &str) -> Result<(), Error> {
         // SAFETY: `Host` promises a live instance and a physical device of it.
         let p = unsafe { self.instance.get_physical_device_format_properties(self.physical_device, format) };
-        let (wanted, what) = match blends {
-            true => (vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND, "as blended colour attachment"),
-            false => (vk::FormatFeatureFlags::COLOR_ATTACHMENT, "as colour attachment"),
-        };
         if p.optimal_tiling_features.contains(wanted) {
             return Ok(());
         }
         // SAFETY: as above.
         let properties = unsafe { self.instance.get_physical_device_properties(self.physical_device) };
-        Err(Error::Unsupported { device: name(&properties), missing: format!("{format:?} {what}") })
+        Err(Error::Unsupported { device: name(&properties), missing: format!("{format:?} as {what}") })
     }
 
     /// Gives an object a debug name: "meniscus <role>".

@@ -4,11 +4,11 @@
 use crate::{
     Error, Settings,
     device::Limits,
-    input::{Background, EnvironmentShape},
+    input::{Background, EnvironmentShape, Says},
     layers::{Kind, Surfaces},
     method::Offers,
     optics::walk::Walk,
-    passes::{Arrays, Points, compact, cull, extent, occlude, shape, sort},
+    passes::{Arrays, Points, compact, cull, extent, first_surface, occlude, shape, sort, surface},
     plan::{Home, Plan},
     scale::Scale,
     shader, smooth,
@@ -77,6 +77,12 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
     if scene.count > 0 || scene.walks || scene.background == Background::Environment {
         method.optics.member().record(&mut plan, scene, &surfaces);
     }
+    // What later passes of the host's are told of the first surface.
+    if scene.count > 0 && (scene.surface_read || scene.surface_formats().next().is_some()) {
+        plan.work_for(Home::View, "surface");
+        let first = first_surface::record(&mut plan, scene, &surfaces);
+        surface::record(&mut plan, scene, first);
+    }
     plan.finish()
 }
 
@@ -98,12 +104,16 @@ pub(crate) struct Scene<'a> {
     pub environment: Option<EnvironmentShape>,
     pub background: Background,
     pub output: vk::Format,
+    /// Formats of the images that say something of the first surface.
+    pub surface: [Option<(Says, vk::Format)>; Says::ALL.len()],
     /// World to eye.
     pub eye: Mat4,
     /// The liquid's own space; where the device prepares particles only its unit counts.
     pub space: Space,
     /// Whether what each walk met is written too.
     pub walks: bool,
+    /// Whether the first surface is found, for whoever reads it.
+    pub surface_read: bool,
     /// Of smoothing only so many steps, if it has more.
     pub smoothing_steps: Option<u32>,
     /// Whether the device has points larger than a pixel.
@@ -152,9 +162,11 @@ impl<'a> Scene<'a> {
             environment: None,
             background: Background::Environment,
             output: vk::Format::R32G32B32A32_SFLOAT,
+            surface: Default::default(),
             eye: Mat4::IDENTITY,
             space: Space::new(1.0, Vec3::ZERO),
             walks: false,
+            surface_read: false,
             smoothing_steps: None,
             points: limits.point_size > 1.0,
             storage_size: limits.storage_size,
@@ -192,6 +204,11 @@ impl<'a> Scene<'a> {
         };
         let wanted = self.settings.drawing.occlusion_culling && may_cull;
         self.body && wanted && 8 * pixels <= self.storage_size
+    }
+
+    /// What is said of the first surface, and in what format.
+    pub fn surface_formats(&self) -> impl Iterator<Item = (Says, vk::Format)> {
+        self.surface.into_iter().flatten()
     }
 
     /// Whether the last shader encodes sRGB.

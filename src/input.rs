@@ -1,11 +1,15 @@
 //! What the host gives for one frame: particles and camera, its own picture, and where the result goes.
 
+mod surface;
+
 use crate::{
     Error,
     prepare::DevicePositions,
     settings::{Camera, Settings},
 };
 use ash::vk;
+pub(crate) use surface::{Says, has_depth, is_halved};
+pub use surface::{SurfaceOutput, SurfaceOutputs};
 
 /// What a frame shows where no liquid is, and what rays bring back that meet neither liquid nor scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,6 +115,8 @@ pub struct FrameInput<'a> {
     /// Output, of the format given to [`crate::Renderer::new`] and the size given to [`crate::Renderer::resize`], in
     /// `COLOR_ATTACHMENT_OPTIMAL` before and after.
     pub output: vk::ImageView,
+    /// What later passes are told of the first surface: its depth, its normal.
+    pub surface: SurfaceOutputs,
 }
 
 /// Layouts in which a shader may sample an image.
@@ -147,6 +153,7 @@ impl<'a> FrameInput<'a> {
         if self.output == vk::ImageView::null() {
             return Err(Error::parameter("output", "null", "give the view that is to be drawn into"));
         }
+        self.surface.check()?;
         if let Some(e) = &self.environment {
             check_sampled("environment", e.view, e.layout)?;
         }
@@ -183,6 +190,7 @@ impl<'a> FrameInput<'a> {
             environment: None,
             eye_inside: false,
             output,
+            surface: SurfaceOutputs::default(),
         }
     }
 
@@ -226,5 +234,11 @@ impl<'a> FrameInput<'a> {
     #[must_use]
     pub fn output(self, output: vk::ImageView) -> Self {
         FrameInput { output, ..self }
+    }
+
+    /// The same with images that say something of the first surface.
+    #[must_use]
+    pub fn surface(self, surface: SurfaceOutputs) -> Self {
+        FrameInput { surface, ..self }
     }
 }

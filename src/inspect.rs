@@ -30,6 +30,9 @@ use glam::Vec3;
 pub struct Inspection {
     /// What each walk met, into "walk (debug)" and "final direction (debug)".
     pub walks: bool,
+    /// Where each pixel first meets liquid, into "first surface": the normal in world space, outward, and the depth in particle
+    /// radii, 0 where there is no liquid.
+    pub surface: bool,
     /// Where positions are prepared on the device, so many neighbours of every particle, into "neighbours (debug)": for
     /// each its index, how many there are, and the indices of the first of them; 0 lists none.
     pub neighbours: u32,
@@ -41,6 +44,7 @@ pub struct Inspection {
 impl Inspection {
     pub(crate) fn apply(&self, scene: &mut Scene) {
         scene.walks = self.walks;
+        scene.surface_read = self.surface;
         scene.smoothing_steps = self.smoothing_steps;
         if let Some(p) = &mut scene.prepare {
             p.neighbours = self.neighbours;

@@ -112,6 +112,9 @@ impl Pipeline {
         for (format, blend) in &recipe.colors {
             host.check_attachment(*format, *blend != Blend::Replace)?;
         }
+        if let Some(format) = recipe.depth {
+            host.check_depth(format)?;
+        }
         let modules: Result<Vec<_>, _> = recipe.shaders.iter().map(|s| Module::new(host, s)).collect();
         let modules = modules?;
         let mut pipeline = Self::layouts(host, recipe)?;
@@ -207,20 +210,19 @@ impl Pipeline {
         let samples =
             vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(recipe.depth)
-            .depth_write_enable(recipe.depth);
+            .depth_test_enable(recipe.depth.is_some())
+            .depth_write_enable(recipe.depth.is_some());
         let blends: Vec<_> = recipe.colors.iter().map(|(_, blend)| blend.state()).collect();
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
         let mut dynamic_states = vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
-        if recipe.depth {
+        if recipe.depth.is_some() {
             dynamic_states.push(vk::DynamicState::DEPTH_COMPARE_OP);
         }
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
         let formats: Vec<_> = recipe.colors.iter().map(|(format, _)| *format).collect();
-        let depth_format = if recipe.depth { vk::Format::D32_SFLOAT } else { vk::Format::UNDEFINED };
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
             .color_attachment_formats(&formats)
-            .depth_attachment_format(depth_format);
+            .depth_attachment_format(recipe.depth.unwrap_or_default());
         let info = vk::GraphicsPipelineCreateInfo::default()
             .flags(flags)
             .stages(&stage_infos)

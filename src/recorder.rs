@@ -4,7 +4,7 @@ use crate::{
     Error,
     access::{Access, Barrier, State},
     device::Host,
-    input::SceneInput,
+    input::{SceneInput, SurfaceOutputs},
     pipeline::{Pipeline, Pipelines},
     plan::{Call, External, Groups, Home, Made, Plan, Rendering, Step, Target, Vertices, Work},
     profile::Profiler,
@@ -32,6 +32,7 @@ pub(crate) struct Externals {
     pub environment: (vk::ImageView, vk::ImageLayout),
     pub scene: Option<SceneInput>,
     pub output: vk::ImageView,
+    pub surface: SurfaceOutputs,
 }
 
 /// One barrier of a recorded frame.
@@ -254,11 +255,11 @@ impl Recorder<'_> {
         let mut colors = Vec::with_capacity(rendering.colors.len());
         for color in &rendering.colors {
             let load = if color.clear.is_some() { vk::AttachmentLoadOp::CLEAR } else { vk::AttachmentLoadOp::LOAD };
-            let view = self.layer(color.target, color.layer)?;
+            let (view, layout) = self.layer(color.target, color.layer, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)?;
             // Zero is zero in integer formats too; only floats start as anything else.
             let float32 = color.clear.unwrap_or_default();
             let clear = vk::ClearValue { color: vk::ClearColorValue { float32 } };
-            colors.push(attachment(view, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, load, clear));
+            colors.push(attachment(view, layout, load, clear));
         }
         let [width, height] =
             rendering.colors.first().map_or(self.plan.picture, |c| self.plan.attachment_size(c.target));
@@ -266,10 +267,13 @@ impl Recorder<'_> {
         let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&colors);
         let depth_info;
         if let Some(depth) = &rendering.depth {
-            let clear = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: depth.clear, stencil: 0 } };
-            let layout = vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL;
-            depth_info = attachment(self.layer(depth.target, 0)?, layout, vk::AttachmentLoadOp::CLEAR, clear)
-                .store_op(vk::AttachmentStoreOp::DONT_CARE);
+            let value = vk::ClearDepthStencilValue { depth: depth.clear.unwrap_or_default(), stencil: 0 };
+            let (load, store) = match depth.clear {
+                Some(_) => (vk::AttachmentLoadOp::CLEAR, vk::AttachmentStoreOp::DONT_CARE),
+                None => (vk::AttachmentLoadOp::LOAD, vk::AttachmentStoreOp::STORE),
+            };
+            let (view, layout) = self.layer(depth.target, 0, vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL)?;
+            depth_info = attachment(view, layout, load, vk::ClearValue { depth_stencil: value }).store_op(store);
             info = info.depth_attachment(&depth_info);
         }
         let viewport =
@@ -337,14 +341,22 @@ impl Recorder<'_> {
         }
     }
 
-    /// One layer of an image, to be drawn into.
-    fn layer(&self, target: Target, layer: u32) -> Result<vk::ImageView, Error> {
-        let name = self.plan.resource(target).name;
+    /// One layer of an image, to be drawn into, and the layout it is in then: if it is the frame's own, this one.
+    fn layer(
+        &self,
+        target: Target,
+        layer: u32,
+        own: vk::ImageLayout,
+    ) -> Result<(vk::ImageView, vk::ImageLayout), Error> {
+        let absent = || absent("recording", self.plan.resource(target).name);
         match self.plan.resource(target).made {
-            Made::Given(External::Output(_)) => Ok(self.externals.output),
+            Made::Given(External::Output(_)) => Ok((self.externals.output, own)),
+            Made::Given(External::Surface(says, _)) => {
+                self.externals.surface.of(says).map(|o| (o.view, o.layout)).ok_or_else(absent)
+            }
             _ => match self.own(target)? {
-                Resource::Image(i) => i.layers.get(layer as usize).copied().ok_or_else(|| absent("recording", name)),
-                Resource::Buffer(_) => Err(absent("recording", name)),
+                Resource::Image(i) => i.layers.get(layer as usize).map(|view| (*view, own)).ok_or_else(absent),
+                Resource::Buffer(_) => Err(absent()),
             },
         }
     }

@@ -171,6 +171,7 @@ impl Renderer {
         let mut scene = Scene::new(input.settings, size, [self.scene.splash, self.scene.body], &self.limits);
         (scene.output, scene.background) = (self.output, input.background);
         scene.environment = input.environment.map(|e| e.shape);
+        scene.surface = input.surface.formats();
         (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
         scene.space = input.positions.map_or(self.scene.space, |p| Space::new(p.radius, Vec3::ZERO));
         if let Some(p) = &input.positions {
@@ -217,9 +218,9 @@ impl Renderer {
     /// * The buffer of [`FrameInput::positions`], and that of their ids if they have any, are alive until the frame has
     ///   completed, hold what is said of them, have usage `STORAGE_BUFFER`, and their earlier writes are visible to reads
     ///   in compute shaders. What is written there later waits for the frame's compute shaders.
-    /// * The output, and what there is of the scene and of an environment of the host's, are alive until the frame has
-    ///   completed and in the stated layouts; output and scene are of this size. Their earlier writes are visible to
-    ///   sampling in fragment shaders, and those of the output to the colour-attachment stage.
+    /// * The output, and what there is of the scene, of an environment of the host's and of [`FrameInput::surface`], are alive until
+    ///   the frame has completed and in the stated layouts; all but the environment are of this size. Their earlier writes are
+    ///   visible to sampling in fragment shaders, and those of the output and of the surface's images to the attachment stages.
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, input: &FrameInput) -> Result<(), Error> {
         input.settings.validate()?;
         input.camera.validate()?;
@@ -309,10 +310,12 @@ impl Renderer {
         block.largest_point = self.limits.point_size as u32;
         block.quads_only = u32::from(input.settings.drawing.quads_only || !scene.points);
         block.eye_inside = f32::from(input.eye_inside);
-        if let Some(scene) = &input.scene {
+        if input.scene.is_some() || input.surface.depth.is_some() {
             let p = &input.camera.projection;
             block.scene_z_scale = p.z_axis.z;
             block.scene_z_offset = p.w_axis.z / space.radius as f32;
+        }
+        if let Some(scene) = &input.scene {
             block.scene_cleared = scene.cleared_depth;
         }
         let particles = self.particles.as_ref();
@@ -326,6 +329,7 @@ impl Renderer {
             environment,
             scene: input.scene,
             output: input.output,
+            surface: input.surface,
         };
         for scale in Scale::ALL {
             let at = scale.offset() as usize;

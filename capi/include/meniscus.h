@@ -366,6 +366,46 @@ typedef struct {
 } MeniscusEnvironment;
 
 /**
+ * What a frame says of the first surface that each pixel shows, the one that the picture has, into images of the host's: loaded,
+ * written where liquid shows, stored. Where none shows they keep what they hold. They are of one sample and of the output's size. An
+ * eye in the liquid sees it from the near plane on, which is then the surface, facing the eye.
+ */
+typedef struct {
+    /**
+     * sizeof(MeniscusSurface).
+     */
+    size_t struct_size;
+    /**
+     * Its depth as the camera's projection has it, clamped to 0..1; or null. Of a format with depth, as a depth attachment that is
+     * written without a test: the host's own depth buffer, say, if the scene that this frame samples is another image. Or of
+     * R32_SFLOAT.
+     */
+    VkImageView depth;
+    /**
+     * Its unit normal in world space, towards the eye's side; or null. As it is in RGBA formats that hold signs
+     * (R32G32B32A32_SFLOAT, R16G16B16A16_SFLOAT, R16G16B16A16_SNORM, R8G8B8A8_SNORM), as (n + 1) / 2 in others
+     * (A2B10G10R10_UNORM_PACK32, R16G16B16A16_UNORM, R8G8B8A8_UNORM); alpha is 1.
+     */
+    VkImageView normal;
+    /**
+     * Format of the depth's view.
+     */
+    VkFormat depth_format;
+    /**
+     * Layout the depth is in, before and after: one in which it can be attached.
+     */
+    VkImageLayout depth_layout;
+    /**
+     * Format of the normal's view.
+     */
+    VkFormat normal_format;
+    /**
+     * Layout the normal is in, before and after: one in which it can be attached.
+     */
+    VkImageLayout normal_layout;
+} MeniscusSurface;
+
+/**
  * One frame. Pointers are read before the call returns.
  */
 typedef struct {
@@ -414,6 +454,10 @@ typedef struct {
      * VK_TRUE if the eye is inside the body (meniscus_density_at): every ray then starts in it. A density field knows by itself.
      */
     VkBool32 eye_inside;
+    /**
+     * What later passes are told of the first surface; or null.
+     */
+    const MeniscusSurface *surface;
 } MeniscusFrame;
 
 /**

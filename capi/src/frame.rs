@@ -7,10 +7,11 @@ use crate::{
     versioned::{Versioned, borrow, read, read_some},
 };
 use renderer::{
-    Background, Camera, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput, Settings,
+    Background, Camera, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput, Settings, SurfaceOutput,
+    SurfaceOutputs,
     ash::vk::{
-        Bool32 as VkBool32, Buffer as VkBuffer, DeviceSize as VkDeviceSize, ImageLayout as VkImageLayout,
-        ImageView as VkImageView,
+        Bool32 as VkBool32, Buffer as VkBuffer, DeviceSize as VkDeviceSize, Format as VkFormat,
+        ImageLayout as VkImageLayout, ImageView as VkImageView,
     },
     prepare::{DeviceIds, DevicePositions, Options},
 };
@@ -132,6 +133,51 @@ unsafe impl Versioned for MeniscusEnvironment {
     const LEAST: usize = offset_of!(MeniscusEnvironment, shape);
 }
 
+/// What a frame says of the first surface that each pixel shows, the one that the picture has, into images of the host's: loaded,
+/// written where liquid shows, stored. Where none shows they keep what they hold. They are of one sample and of the output's size. An
+/// eye in the liquid sees it from the near plane on, which is then the surface, facing the eye.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct MeniscusSurface {
+    /// sizeof(MeniscusSurface).
+    pub struct_size: usize,
+    /// Its depth as the camera's projection has it, clamped to 0..1; or null. Of a format with depth, as a depth attachment that is
+    /// written without a test: the host's own depth buffer, say, if the scene that this frame samples is another image. Or of
+    /// R32_SFLOAT.
+    pub depth: VkImageView,
+    /// Its unit normal in world space, towards the eye's side; or null. As it is in RGBA formats that hold signs
+    /// (R32G32B32A32_SFLOAT, R16G16B16A16_SFLOAT, R16G16B16A16_SNORM, R8G8B8A8_SNORM), as (n + 1) / 2 in others
+    /// (A2B10G10R10_UNORM_PACK32, R16G16B16A16_UNORM, R8G8B8A8_UNORM); alpha is 1.
+    pub normal: VkImageView,
+    /// Format of the depth's view.
+    pub depth_format: VkFormat,
+    /// Layout the depth is in, before and after: one in which it can be attached.
+    pub depth_layout: VkImageLayout,
+    /// Format of the normal's view.
+    pub normal_format: VkFormat,
+    /// Layout the normal is in, before and after: one in which it can be attached.
+    pub normal_layout: VkImageLayout,
+}
+
+// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers and handles.
+unsafe impl Versioned for MeniscusSurface {
+    const NAME: &'static str = "MeniscusSurface";
+    const LEAST: usize = size_of::<MeniscusSurface>();
+}
+
+impl MeniscusSurface {
+    /// What the renderer takes.
+    fn get(&self) -> SurfaceOutputs {
+        let output =
+            |view, format, layout| (view != VkImageView::null()).then(|| SurfaceOutput::new(view, format, layout));
+        SurfaceOutputs::default().depth(output(self.depth, self.depth_format, self.depth_layout)).normal(output(
+            self.normal,
+            self.normal_format,
+            self.normal_layout,
+        ))
+    }
+}
+
 /// One frame. Pointers are read before the call returns.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -159,6 +205,8 @@ pub struct MeniscusFrame {
     pub still: VkBool32,
     /// VK_TRUE if the eye is inside the body (meniscus_density_at): every ray then starts in it. A density field knows by itself.
     pub eye_inside: VkBool32,
+    /// What later passes are told of the first surface; or null.
+    pub surface: *const MeniscusSurface,
 }
 
 // SAFETY: repr(C); its size first; no padding (a test adds it up); numbers, handles and pointers that may be null.
@@ -179,6 +227,7 @@ pub(crate) struct Read {
     output: VkImageView,
     still: bool,
     eye_inside: bool,
+    surface: SurfaceOutputs,
 }
 
 impl Read {
@@ -186,11 +235,12 @@ impl Read {
     /// As [`read`], for the frame and what it points to; the settings are ours.
     pub unsafe fn new(frame: *const MeniscusFrame) -> Result<Read, Failure> {
         // SAFETY: this function's contract.
-        let (f, camera, settings, positions, scene, environment) = unsafe {
+        let (f, camera, settings, positions, scene, environment, surface) = unsafe {
             let f = read(frame)?;
             let settings = borrow(f.settings, "MeniscusFrame::settings")?;
             let camera = MeniscusCamera::get(f.camera)?;
-            (f, camera, settings, read_some(f.positions)?, read_some(f.scene)?, read_some(f.environment)?)
+            let (scene, environment) = (read_some(f.scene)?, read_some(f.environment)?);
+            (f, camera, settings, read_some(f.positions)?, scene, environment, read_some(f.surface)?)
         };
         let background = match f.background {
             MENISCUS_BACKGROUND_ENVIRONMENT => Background::Environment,
@@ -221,6 +271,7 @@ impl Read {
             output: f.output,
             still: f.still != 0,
             eye_inside: f.eye_inside != 0,
+            surface: surface.map(|s: MeniscusSurface| s.get()).unwrap_or_default(),
         })
     }
 
@@ -233,6 +284,7 @@ impl Read {
             .background(self.background)
             .still(self.still)
             .eye_inside(self.eye_inside)
+            .surface(self.surface)
     }
 }
 

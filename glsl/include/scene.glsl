@@ -1,16 +1,7 @@
 // The host's opaque scene, pixel by pixel, and what is seen past the liquid.
+#include "scene_depth.glsl"
 #ifdef SCENE
 layout(set = 0, binding = 8) uniform texture2D scene_color; // the host's opaque scene, linear
-layout(set = 0, binding = 9) uniform texture2D scene_depth; // its depth buffer
-
-const float CLEARED = 1e30; // linear depth where the host drew nothing
-
-float scene_linear(ivec2 p) {
-    float z = texelFetch(scene_depth, p, 0).x;
-    return z == frame.scene_cleared ? CLEARED : frame.scene_z_offset / (z + frame.scene_z_scale);
-}
-
-bool scene_hides(ivec2 pixel, float depth) { return scene_linear(pixel) < depth; }
 
 vec3 scene_light(ivec2 pixel) { return texelFetch(scene_color, pixel, 0).rgb; }
 
@@ -28,7 +19,6 @@ vec3 infinitely_far(vec3 dir) {
 // The background straight through a pixel.
 vec3 behind(ivec2 pixel, vec3 dir) { return scene_linear(pixel) < CLEARED ? scene_light(pixel) : env_color(dir); }
 #else
-bool scene_hides(ivec2 pixel, float depth) { return false; }
 vec3 infinitely_far(vec3 dir) { return env_color(dir); }
 vec3 behind(ivec2 pixel, vec3 dir) { return env_color(dir); }
 #endif

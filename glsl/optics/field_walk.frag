@@ -30,9 +30,7 @@ layout(location = 2) out vec4 out_direction; // world space; w: surfaces whose n
 #include "background.glsl"
 #include "field_space.glsl"
 #include "field_walls.glsl"
-layout(set = 0, binding = 10, std430) readonly buffer TileBlock { uvec2 at[]; } tiles; // field_tiles.comp
-
-const int AIR = -1; // beside the classes: what a ray is in
+#include "field_first.glsl"
 
 // How far a pixel's view ray has come.
 struct Walk {
@@ -211,26 +209,15 @@ void main() {
     vec3 v = view_ray(gl_FragCoord.xy), eye_dir = normalize(v);
     Walk w = Walk(to_field(frame.near * v), transpose(mat3(frame.view)) * eye_dir, vec3(0.0), vec3(1.0), 0.0, 0.0, 0.0, AIR, vec3(0.0), -1,
                   OUTCOME_HIT, 0u, 0u, pixel);
-    // From where to where the ray can meet liquid.
-    uvec2 bounds = tiles.at[(pixel.y / FIELD_TILE) * ((int(frame.size.x) + FIELD_TILE - 1) / FIELD_TILE) + pixel.x / FIELD_TILE];
-    float per_depth = 1.0 / (-eye_dir.z * push.spacing);
-    vec2 range = vec2((uintBitsToFloat(bounds.x) - frame.near) * per_depth, (uintBitsToFloat(INFINITE - bounds.y) - frame.near) * per_depth);
-    if (bounds.x == INFINITE) range = vec2(NONE, 0.0);
     Block block = NOWHERE;
-    // The near plane may lie in the liquid.
-    for (bool look = range.x <= 0.0 && range.y >= 0.0; look; look = false) {
-        uint ball;
-        if (in_field(block, w.x, ball)) w.within = CLASS_BODY;
-        else if (ball_around(w.x, ball, w.center)) w.within = CLASS_SPLASH;
-    }
-    int first = w.within;
-    bool straight = first != AIR, stopped = false;
-    Wall wall = Wall(0.0, CLASS_BODY, vec3(0.0), 0u, 0u);
+    bool stopped;
+    Wall wall = first_wall(block, pixel, w.x, w.dir, eye_dir, w.within, w.center, stopped);
+    int first = wall.cls;
+    bool straight = w.within != AIR;
     if (straight) {
+        first = w.within;
         w.volumes = 1u;
     } else {
-        wall = find_wall(block, w.x, w.dir, false, max(range.x, 0.0), range.y + FIELD_NUDGE, stopped);
-        first = wall.cls;
         w.x += wall.t * w.dir;
     }
     if (wall.t == NONE || scene_hides(pixel, -to_eye(w.x).z)) {

@@ -1,11 +1,11 @@
-//! A colour image of the host's.
+//! An image of the host's: colours or depths.
 
 use super::{Gpu, HostError, vulkan};
 use crate::{Error, access::Barrier};
 use ash::vk;
 use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
-/// A colour image to render into and read back.
+/// An image to render into and read back.
 pub struct Canvas<'a> {
     gpu: &'a Gpu<'a>,
     image: vk::Image,
@@ -14,11 +14,15 @@ pub struct Canvas<'a> {
     size: [u32; 2],
     faces: u32,
     texel: u64,
+    /// What is viewed and copied.
+    aspect: vk::ImageAspectFlags,
+    /// Of all that there is.
+    aspects: vk::ImageAspectFlags,
     allocation: Option<Allocation>,
 }
 
 impl<'a> Canvas<'a> {
-    /// A colour image with `texel` bytes a pixel.
+    /// An image with `texel` bytes a pixel; of a format with stencil, of its depth alone.
     pub fn new(gpu: &'a Gpu<'a>, format: vk::Format, texel: u64, size: [u32; 2]) -> Result<Canvas<'a>, HostError> {
         Self::with_faces(gpu, format, texel, size, 1)
     }
@@ -35,12 +39,19 @@ impl<'a> Canvas<'a> {
         size: [u32; 2],
         faces: u32,
     ) -> Result<Canvas<'a>, HostError> {
+        let depth = crate::input::has_depth(format);
+        let (attachment, aspect) = match depth {
+            true => (vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT, vk::ImageAspectFlags::DEPTH),
+            false => (vk::ImageUsageFlags::COLOR_ATTACHMENT, vk::ImageAspectFlags::COLOR),
+        };
+        let stencil = [vk::Format::D16_UNORM_S8_UINT, vk::Format::D24_UNORM_S8_UINT, vk::Format::D32_SFLOAT_S8_UINT];
+        let aspects = if stencil.contains(&format) { aspect | vk::ImageAspectFlags::STENCIL } else { aspect };
         let spec = crate::resources::ImageSpec {
             format,
             size,
             layers: faces,
             array: false,
-            usage: vk::ImageUsageFlags::COLOR_ATTACHMENT
+            usage: attachment
                 | vk::ImageUsageFlags::TRANSFER_SRC
                 | vk::ImageUsageFlags::SAMPLED
                 | vk::ImageUsageFlags::TRANSFER_DST,
@@ -51,7 +62,8 @@ impl<'a> Canvas<'a> {
         };
         // SAFETY: complete info on a live device.
         let image = unsafe { gpu.device.create_image(&spec.info().flags(flags), None) }.map_err(vulkan("canvas"))?;
-        let mut canvas = Canvas { gpu, image, view: vk::ImageView::null(), size, faces, texel, allocation: None };
+        let view = vk::ImageView::null();
+        let mut canvas = Canvas { gpu, image, view, size, faces, texel, aspect, aspects, allocation: None };
         // SAFETY: the image was just made; its memory is kept until it is destroyed.
         unsafe {
             let requirements = gpu.device.get_image_memory_requirements(image);
@@ -63,7 +75,7 @@ impl<'a> Canvas<'a> {
                 .image(image)
                 .view_type(view_type)
                 .format(format)
-                .subresource_range(crate::access::whole(vk::ImageAspectFlags::COLOR));
+                .subresource_range(crate::access::whole(aspect));
             canvas.view = gpu.device.create_image_view(&info, None).map_err(vulkan("canvas"))?;
         }
         Ok(canvas)
@@ -84,14 +96,14 @@ impl<'a> Canvas<'a> {
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
         let memory = vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE;
         let barrier = Barrier { src: (all, memory, from), dst: (all, memory, to) };
-        let barrier = [barrier.on_image(self.image, vk::ImageAspectFlags::COLOR)];
+        let barrier = [barrier.on_image(self.image, self.aspects)];
         // SAFETY: `cmd` is recording outside rendering; the image is alive and in the layout `from`.
         unsafe {
             self.gpu.device.cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default().image_memory_barriers(&barrier))
         };
     }
 
-    /// Records a clear of the whole image, which is in `layout`.
+    /// Records a clear of the whole image, of colours, which is in `layout`.
     pub fn clear(&self, cmd: vk::CommandBuffer, layout: vk::ImageLayout, value: [f32; 4]) {
         let range = [crate::access::whole(vk::ImageAspectFlags::COLOR)];
         let value = vk::ClearColorValue { float32: value };
@@ -122,15 +134,19 @@ impl<'a> Canvas<'a> {
     }
 
     fn whole(&self) -> vk::BufferImageCopy {
-        let layers =
-            vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(self.faces);
+        let layers = vk::ImageSubresourceLayers::default().aspect_mask(self.aspect).layer_count(self.faces);
         let extent = vk::Extent3D { width: self.size[0], height: self.size[1], depth: 1 };
         vk::BufferImageCopy::default().image_subresource(layers).image_extent(extent)
     }
 
     /// The pixels, row by row, after a frame that left them in `COLOR_ATTACHMENT_OPTIMAL`; there they stay.
     pub fn read(&self) -> Result<Vec<u8>, HostError> {
-        let (drawn, source) = (vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
+        self.read_in(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+    }
+
+    /// The same after a frame that left them in another layout.
+    pub fn read_in(&self, drawn: vk::ImageLayout) -> Result<Vec<u8>, HostError> {
+        let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
         self.gpu.read_back(self.bytes(), |cmd, buffer| {
             self.transition(cmd, drawn, source);
             // SAFETY: `cmd` is recording; the buffer holds the whole image.
@@ -142,8 +158,15 @@ impl<'a> Canvas<'a> {
 
     /// The same as RGB, of four floats a pixel.
     pub fn picture(&self) -> Result<Vec<[f32; 3]>, HostError> {
+        Ok(self.layers()?.0)
+    }
+
+    /// The same as RGB, and alpha apart from it.
+    pub fn layers(&self) -> Result<(Vec<[f32; 3]>, Vec<f32>), HostError> {
         let float = |at: &[u8]| f32::from_ne_bytes([at[0], at[1], at[2], at[3]]);
-        Ok(self.read()?.chunks_exact(16).map(|p| [float(p), float(&p[4..]), float(&p[8..])]).collect())
+        let bytes = self.read()?;
+        let pixels = bytes.chunks_exact(16);
+        Ok(pixels.map(|p| ([float(p), float(&p[4..]), float(&p[8..])], float(&p[12..]))).unzip())
     }
 }
 

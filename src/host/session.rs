@@ -65,6 +65,11 @@ impl<'a> Session<'a> {
         self.canvas.picture()
     }
 
+    /// The same, and its alpha: the liquid's coverage before [`crate::Background::Host`], in which light is premultiplied.
+    pub fn layers(&self) -> Result<(Vec<[f32; 3]>, Vec<f32>), HostError> {
+        self.canvas.layers()
+    }
+
     /// The words of one layer of a target, or of a buffer; `None` if the last frame did without it.
     pub fn words(&mut self, name: &'static str, layer: u32) -> Result<Option<Vec<u32>>, HostError> {
         let bytes = match self.renderer.spec(name) {

@@ -138,14 +138,31 @@ fn decode(name: &Path, mut input: impl BufRead + Seek, frame: &Frame<'_>) -> Res
     }
 }
 
-/// Reads a picture of linear light (.exr, .hdr) or sRGB (.png, made linear): its width and height, and RGB row by row.
+/// Reads a picture of linear light (.exr, .hdr) or sRGB (.png, made linear): its width and height, and RGB row by row. What is
+/// transparent lies on black.
 ///
 /// # Errors
 /// [`ImageError`] with the file's name: it is no picture, is damaged, or has light that is not finite.
 pub fn read_picture(path: &Path, budget: &Budget) -> Result<([u32; 2], Vec<[f32; 3]>), ImageError> {
     let io = |source| ImageError::Io { path: path.into(), source };
+    picture_in(path, BufReader::new(File::open(path).map_err(io)?), budget)
+}
+
+/// [`read_picture`] of a file's bytes; `name` stands in messages.
+///
+/// # Errors
+/// As [`read_picture`], but for those of the file system.
+pub fn picture_from_bytes(name: &Path, bytes: &[u8], budget: &Budget) -> Result<([u32; 2], Vec<[f32; 3]>), ImageError> {
+    picture_in(name, Cursor::new(bytes), budget)
+}
+
+fn picture_in(
+    path: &Path,
+    file: impl BufRead + Seek,
+    budget: &Budget,
+) -> Result<([u32; 2], Vec<[f32; 3]>), ImageError> {
+    let io = |source| ImageError::Io { path: path.into(), source };
     let decoding = |detail: String| ImageError::Decode { path: path.into(), detail };
-    let file = BufReader::new(File::open(path).map_err(io)?);
     let mut reader = image::ImageReader::new(file).with_guessed_format().map_err(io)?;
     let mut limits = image::Limits::default();
     // What is decoded is at hand twice for a moment.
@@ -154,9 +171,14 @@ pub fn read_picture(path: &Path, budget: &Budget) -> Result<([u32; 2], Vec<[f32;
     let srgb = reader.format() == Some(ImageFormat::Png);
     let decoded =
         guard::quietly(|| reader.decode()).map_err(|panic| ImageError::Panicked { path: path.into(), panic })?;
-    let picture = decoded.map_err(|e| decoding(e.to_string()))?.into_rgb32f();
-    let size = [picture.width(), picture.height()];
-    let mut rgb = picture.into_raw().as_chunks::<3>().0.to_vec();
+    let decoded = decoded.map_err(|e| decoding(e.to_string()))?;
+    let size = [decoded.width(), decoded.height()];
+    // OpenEXR has light premultiplied, sRGB has not.
+    let alpha: Vec<f32> = match srgb && decoded.color().has_alpha() {
+        true => decoded.to_rgba32f().into_raw().as_chunks::<4>().0.iter().map(|p| p[3]).collect(),
+        false => Vec::new(),
+    };
+    let mut rgb = decoded.into_rgb32f().into_raw().as_chunks::<3>().0.to_vec();
     if let Some(bad) = rgb.as_flattened().iter().position(|v| !v.is_finite()) {
         let (x, y) = (bad / 3 % size[0].max(1) as usize, bad / 3 / size[0].max(1) as usize);
         return Err(decoding(format!("pixel {x}, {y} is not finite")));
@@ -164,6 +186,7 @@ pub fn read_picture(path: &Path, budget: &Budget) -> Result<([u32; 2], Vec<[f32;
     if srgb {
         rgb.as_flattened_mut().iter_mut().for_each(|v| *v = crate::srgb::decode_srgb(*v));
     }
+    rgb.iter_mut().zip(&alpha).for_each(|(c, a)| *c = c.map(|v| v * a));
     Ok((size, rgb))
 }
 
@@ -191,11 +214,51 @@ pub fn encode_labelled(
     rgb: &[[f32; 3]],
     label: Option<&str>,
 ) -> Result<Vec<u8>, ImageError> {
+    encode_layers(path, size, &Layers { rgb, ..Layers::default() }, label)
+}
+
+/// What a picture holds, row by row.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Layers<'a> {
+    /// Linear light; premultiplied, where there is alpha.
+    pub rgb: &'a [[f32; 3]],
+    /// Coverage.
+    pub alpha: Option<&'a [f32]>,
+    /// Depth along the view axis.
+    pub depth: Option<&'a [f32]>,
+    /// Normals.
+    pub normal: Option<&'a [[f32; 3]]>,
+}
+
+/// [`encode_labelled`] of more than colour: .png has alpha (straight), .exr all of it, in the channels R, G, B, A, Z, normal.X,
+/// normal.Y and normal.Z.
+///
+/// # Errors
+/// As [`encode_picture`].
+pub fn encode_layers(
+    path: &Path,
+    size: [u32; 2],
+    layers: &Layers<'_>,
+    label: Option<&str>,
+) -> Result<Vec<u8>, ImageError> {
     match extension(path).as_deref() {
-        Some("png") => png::write(size, &srgb_bytes(rgb), label).map_err(failed(path)),
-        Some("exr") => exr::write(size, rgb, label).map_err(failed(path)),
+        Some("png") => match layers.alpha {
+            Some(alpha) => png::write_alpha(size, &straight_bytes(layers.rgb, alpha), label),
+            None => png::write(size, &srgb_bytes(layers.rgb), label),
+        }
+        .map_err(failed(path)),
+        Some("exr") => exr::write(size, layers, label).map_err(failed(path)),
         _ => Err(ImageError::Extension(path.into())),
     }
+}
+
+/// Premultiplied light as straight sRGB and alpha.
+fn straight_bytes(rgb: &[[f32; 3]], alpha: &[f32]) -> Vec<[u8; 4]> {
+    let pixel = |(c, a): (&[f32; 3], &f32)| {
+        let [r, g, b] = if *a > 0.0 { c.map(|v| crate::srgb::srgb_byte(v / a)) } else { [0; 3] };
+        [r, g, b, (255.0 * a.clamp(0.0, 1.0)).round() as u8]
+    };
+    rgb.iter().zip(alpha).map(pixel).collect()
 }
 
 /// What an encoder says, with the picture's name.

@@ -48,7 +48,6 @@ pub struct Lookup {
 
 impl Lookup {
     /// The look-up that optics stand for, if they are one.
-    #[cfg_attr(not(feature = "inspect"), expect(dead_code, reason = "twins and tests ask"))]
     pub fn of(optics: &Optics) -> Option<Lookup> {
         match *optics {
             Optics::Ssfr(p) => Some(p.into()),

@@ -1,7 +1,7 @@
 //! How light goes through the liquid's surfaces.
 
 mod environment;
-mod field_walk;
+pub(crate) mod field_walk;
 pub mod four;
 pub mod instant_liquids;
 pub(crate) mod lookup;

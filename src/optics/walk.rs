@@ -124,7 +124,7 @@ pub(super) fn variant(scene: &Scene) -> usize {
 }
 
 /// Maps that nothing looks at.
-pub(super) fn placeholder(plan: &mut Plan) -> Surface {
+pub(crate) fn placeholder(plan: &mut Plan) -> Surface {
     let depth = plan.nothing("no depth", Format::R32_SFLOAT, true);
     Surface { depth, normal: plan.nothing("no normal", Format::R32_UINT, true), sides: 1 }
 }

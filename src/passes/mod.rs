@@ -1,12 +1,14 @@
-//! The passes before the first surface: preparation of particles on the device, and which of them are drawn. One file
-//! each, the same stem as its shader, twin and test.
+//! The passes before the layers, preparation of particles on the device and which of them are drawn; and those after the picture, what
+//! the host is told of the first surface. One file each, the same stem as its shader, twin and test.
 
 pub(crate) mod compact;
 pub(crate) mod cull;
 pub(crate) mod extent;
+pub(crate) mod first_surface;
 pub(crate) mod occlude;
 pub(crate) mod shape;
 pub(crate) mod sort;
+pub(crate) mod surface;
 
 use crate::{
     optics::tiles::Tiles,

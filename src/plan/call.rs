@@ -18,8 +18,8 @@ pub(crate) struct Recipe {
     pub topology: vk::PrimitiveTopology,
     /// Formats of the colour attachments, and how each blends.
     pub colors: Vec<(vk::Format, Blend)>,
-    /// Whether there is a depth attachment, tested and written; D32_SFLOAT.
-    pub depth: bool,
+    /// Format of the depth attachment, tested and written, if there is one.
+    pub depth: Option<vk::Format>,
 }
 
 /// What becomes of a colour that is drawn over another.
@@ -123,7 +123,7 @@ impl Call {
             constants: Vec::new(),
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             colors: Vec::new(),
-            depth: false,
+            depth: None,
         };
         let push = vec![0; recipe.push_bytes() as usize];
         Call { recipe, bound: Vec::new(), push, named: Vec::new(), counts: &[], pushed: Vec::new(), wrong: None }

@@ -2,6 +2,7 @@
 
 use super::{Declared, External, Home, Made, Plan, Target};
 use crate::{
+    input::Says,
     resources::{ImageSpec, Spec},
     scale::Scale,
 };
@@ -97,6 +98,8 @@ impl Plan {
             External::SceneColor => ("scene colour (host's)", Home::View),
             External::SceneDepth => ("scene depth (host's)", Home::View),
             External::Output(_) => ("output (host's)", Home::View),
+            External::Surface(Says::Depth, _) => ("surface depth (host's)", Home::View),
+            External::Surface(Says::Normal, _) => ("surface normal (host's)", Home::View),
         };
         self.resources.push(Declared { name, home, made: Made::Given(external), per_particle: false });
         Target(self.resources.len() - 1)

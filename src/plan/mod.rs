@@ -16,6 +16,7 @@ pub(crate) use step::{Groups, Rendering, Step, Vertices, Work};
 use crate::{
     Error,
     access::Access,
+    input::Says,
     resources::{ImageSpec, Spec},
     scale::Scale,
 };
@@ -53,6 +54,8 @@ pub(crate) enum External {
     SceneColor,
     SceneDepth,
     Output(vk::Format),
+    /// What the host is told of the first surface.
+    Surface(Says, vk::Format),
 }
 
 /// How a resource comes to be.

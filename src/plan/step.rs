@@ -69,10 +69,11 @@ pub(crate) struct Color {
     pub blend: Blend,
 }
 
-/// A depth attachment, tested and written; what it holds is lost afterwards.
+/// A depth attachment, tested and written.
 pub(crate) struct Depth {
     pub target: Target,
-    pub clear: f32,
+    /// What it starts as, and then what it holds is lost afterwards; `None`: it keeps what it holds.
+    pub clear: Option<f32>,
     pub compare: vk::CompareOp,
 }
 
@@ -84,7 +85,7 @@ impl Hash for Color {
 
 impl Hash for Depth {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        (self.target, self.clear.to_bits(), self.compare).hash(state);
+        (self.target, self.clear.map(f32::to_bits), self.compare).hash(state);
     }
 }
 
@@ -118,8 +119,14 @@ impl Rendering {
 
     /// With a depth test.
     pub fn testing(mut self, target: Target, clear: f32, compare: vk::CompareOp) -> Rendering {
-        self.depth = Some(Depth { target, clear, compare });
+        self.depth = Some(Depth { target, clear: Some(clear), compare });
         self
+    }
+
+    /// Into depths alone, over what is there.
+    pub fn over_depth(target: Target) -> Rendering {
+        let depth = Depth { target, clear: None, compare: vk::CompareOp::ALWAYS };
+        Rendering { colors: Vec::new(), depth: Some(depth) }
     }
 }
 
@@ -186,13 +193,12 @@ impl Plan {
     pub fn render(&mut self, pass: &'static str, rendering: Rendering, draws: Vec<(Call, Vertices)>) {
         let mut formats = Vec::new();
         for color in &rendering.colors {
-            let format = match (self.resource(color.target).made, self.image_spec(color.target)) {
-                (Made::Given(External::Output(format)), _) => format,
-                (_, Some(spec)) if color.layer < spec.layers => spec.format,
+            match self.attachment_format(color.target) {
+                Some((format, layers)) if color.layer < layers => formats.push((format, color.blend)),
                 _ => return self.refuse(pass, format!("{} is no attachment", self.resource(color.target).name)),
-            };
-            formats.push((format, color.blend));
+            }
         }
+        let depth = rendering.depth.as_ref().and_then(|d| Some(self.attachment_format(d.target)?.0));
         let mut uses: Vec<(Target, Access)> = Vec::new();
         let mut add = |one: (Target, Access)| {
             if !uses.contains(&one) {
@@ -202,7 +208,7 @@ impl Plan {
         let mut ready = Vec::with_capacity(draws.len());
         for (mut call, vertices) in draws {
             call.recipe.colors = formats.clone();
-            call.recipe.depth = rendering.depth.is_some();
+            call.recipe.depth = depth;
             if !call.counts.is_empty() {
                 return self.refuse(pass, "only dispatches count".into());
             }
@@ -222,6 +228,14 @@ impl Plan {
             return self.refuse(pass, format!("its attachments are of different sizes: {sizes:?}"));
         }
         self.step(pass, uses, Work::Render { rendering, draws: ready });
+    }
+
+    /// Format and layers of what is drawn into.
+    fn attachment_format(&self, target: Target) -> Option<(vk::Format, u32)> {
+        match self.resource(target).made {
+            Made::Given(External::Output(format) | External::Surface(_, format)) => Some((format, 1)),
+            _ => self.image_spec(target).map(|spec| (spec.format, spec.layers)),
+        }
     }
 
     /// Width and height of what is drawn into.

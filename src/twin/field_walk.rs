@@ -3,6 +3,7 @@
 
 use super::{
     background::env_color,
+    first_surface::First,
     optics::{fresnel, reflect, refract},
     quadric::pixel_ray,
     walk::Walk,
@@ -354,43 +355,67 @@ impl Walker<'_> {
     }
 }
 
+impl<'a> Walker<'a> {
+    /// On the view ray of a pixel, at the near plane.
+    fn new(
+        field: &'a Field,
+        view: &'a Maps,
+        settings: &'a Rays,
+        environment: &'a Equirect,
+        pixel: [usize; 2],
+    ) -> Walker<'a> {
+        let frame = view.frame;
+        let v = pixel_ray(frame, pixel[0] as u32, pixel[1] as u32);
+        let to_world = Mat3::from_mat4(frame.view).as_dmat3().transpose();
+        let start = f64::from(frame.near) * v - frame.view.w_axis.xyz().as_dvec3();
+        Walker {
+            field,
+            view,
+            settings,
+            environment,
+            x: to_world * start / field.spacing + field.part,
+            dir: to_world * v.normalize(),
+            color: Vec3::ZERO,
+            light: Vec3::ONE,
+            hits: 0,
+            length: 0.0,
+            bounces: 0,
+            on_scene: None,
+            waiting: Vec::new(),
+        }
+    }
+
+    /// Goes to the first liquid, unless the scene hides it; and whether the ray starts in it.
+    fn start(&mut self, pixel: [usize; 2]) -> Option<(Liquid, bool)> {
+        let around = match self.field.at(self.x) >= 0.0 {
+            true => Some(Liquid::Body),
+            false => self.field.ball_around(self.x).map(Liquid::Ball),
+        };
+        let (first, t) = around.map(|liquid| (liquid, 0.0)).or_else(|| self.enter())?;
+        let x = self.x + t * self.dir;
+        if -self.eye(x).z > self.view.scene_depth(pixel) {
+            return None;
+        }
+        self.x = x;
+        Some((first, around.is_some()))
+    }
+}
+
 /// Walks the view ray of one pixel. `view` has the frame and the host's scene; its maps may be empty.
 pub fn walk(field: &Field, view: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize; 2]) -> Walk {
-    let frame = view.frame;
-    let v = pixel_ray(frame, pixel[0] as u32, pixel[1] as u32);
-    let to_world = Mat3::from_mat4(frame.view).as_dmat3().transpose();
-    let start = f64::from(frame.near) * v - frame.view.w_axis.xyz().as_dvec3();
-    let mut walker = Walker {
-        field,
-        view,
-        settings,
-        environment,
-        x: to_world * start / field.spacing + field.part,
-        dir: to_world * v.normalize(),
-        color: Vec3::ZERO,
-        light: Vec3::ONE,
-        hits: 0,
-        length: 0.0,
-        bounces: 0,
-        on_scene: None,
-        waiting: Vec::new(),
-    };
-    let around = match field.at(walker.x) >= 0.0 {
-        true => Some(Liquid::Body),
-        false => field.ball_around(walker.x).map(Liquid::Ball),
-    };
-    let first = around.map(|liquid| (liquid, 0.0)).or_else(|| walker.enter());
-    let depth = |t: f64| -walker.eye(walker.x + t * walker.dir).z;
-    let Some((first, t)) = first.filter(|(_, t)| depth(*t) <= view.scene_depth(pixel)) else {
+    let mut walker = Walker::new(field, view, settings, environment, pixel);
+    let Some((first, inside)) = walker.start(pixel) else {
         let color = match view.scene_depth(pixel).is_finite() {
             true => view.scene_light(pixel),
-            false => env_color(environment, Mat3::from_mat4(frame.eye_to_env).as_dmat3() * v.normalize()),
+            false => env_color(
+                environment,
+                Mat3::from_mat4(view.frame.eye_to_env).as_dmat3() * (walker.rotation() * walker.dir),
+            ),
         };
         let (pattern, outcome) = (PATTERN_NONE, OUTCOME_NO_LIQUID);
         return Walk { pattern, outcome, hits: 0, length: 0.0, direction: walker.dir, color };
     };
-    walker.x += t * walker.dir;
-    if around.is_none() {
+    if !inside {
         walker.meet(first, true);
     }
     let (second, outcome) = if settings.refractions == 1 { (None, OUTCOME_HIT) } else { walker.volumes(Some(first)) };
@@ -400,4 +425,19 @@ pub fn walk(field: &Field, view: &Maps, settings: &Rays, environment: &Equirect,
     walker.end();
     walker.reflections();
     Walk { pattern, outcome, hits, length, direction, color: walker.color }
+}
+
+/// The first surface that a pixel shows, of a walk like that (`glsl/first_surface.frag`).
+pub fn first_surface(
+    field: &Field,
+    view: &Maps,
+    settings: &Rays,
+    environment: &Equirect,
+    pixel: [usize; 2],
+) -> Option<First> {
+    let mut walker = Walker::new(field, view, settings, environment, pixel);
+    let (liquid, inside) = walker.start(pixel)?;
+    let outward = if inside { -walker.dir } else { walker.normal(liquid) };
+    let normal = if walker.dir.dot(outward) > 0.0 { -outward } else { outward };
+    Some(First { normal, depth: -walker.eye(walker.x).z })
 }

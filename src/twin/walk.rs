@@ -245,6 +245,12 @@ fn first_volume(maps: &Maps, single: bool, pixel: [usize; 2]) -> Option<(Liquid,
     }
 }
 
+/// The same as a surface: its depth, and its outward normal in eye space where the ray does not start inside.
+pub(super) fn first_surface(maps: &Maps, single: bool, pixel: [usize; 2]) -> Option<(Option<DVec3>, f64)> {
+    let (liquid, depth, bent) = first_volume(maps, single, pixel)?;
+    Some((bent.then(|| maps.normal(liquid.class(), SIDE_FRONT, pixel)), depth))
+}
+
 /// Walks the view ray of one pixel. Index and absorption are the frame's.
 pub fn walk(maps: &Maps, settings: &Rays, environment: &Equirect, pixel: [usize; 2]) -> Walk {
     let frame = maps.frame;

@@ -2,6 +2,8 @@
 
 mod bench;
 mod between;
+mod camera;
+mod compositing;
 mod drivers;
 mod films;
 mod info;

@@ -38,18 +38,26 @@ pub type Painted = (Vec<f64>, Vec<Vec3>);
 
 impl<'a> HostScene<'a> {
     pub fn new(gpu: &'a Gpu<'a>, camera: &Camera, size: [u32; 2], (depth, color): &Painted) -> HostScene<'a> {
+        let z = |d: &f64| z_at(camera, *d);
+        HostScene::of_depths(gpu, size, &depth.iter().map(z).collect::<Vec<_>>(), color)
+    }
+
+    /// With depths as its depth buffer holds them.
+    pub fn of_depths(gpu: &'a Gpu<'a>, size: [u32; 2], depths: &[f32], color: &[Vec3]) -> HostScene<'a> {
         let canvas = |format, texel| Canvas::new(gpu, format, texel, size).expect("canvas");
         let scene = HostScene { color: canvas(FLOAT4, 16), depth: canvas(vk::Format::R32_SFLOAT, 4) };
-        let z = |d: &f64| z_at(camera, *d);
         let rgba: Vec<f32> = color.iter().flat_map(|c| [c.x, c.y, c.z, 1.0]).collect();
-        let depths: Vec<f32> = depth.iter().map(z).collect();
         scene.color.write(bytemuck::cast_slice(&rgba), READ).expect("colour");
-        scene.depth.write(bytemuck::cast_slice(&depths), READ).expect("depth");
+        scene.depth.write(bytemuck::cast_slice(depths), READ).expect("depth");
         scene
     }
 
     pub fn input(&self) -> SceneInput {
-        SceneInput::new((self.color.view, READ), (self.depth.view, READ), CLEARED)
+        self.cleared_to(CLEARED)
+    }
+
+    pub fn cleared_to(&self, cleared: f32) -> SceneInput {
+        SceneInput::new((self.color.view, READ), (self.depth.view, READ), cleared)
     }
 }
 

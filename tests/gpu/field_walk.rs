@@ -42,7 +42,7 @@ fn scene() -> Vec<Vec3> {
     all
 }
 
-fn case(field: Field, refractions: u32, reflections: u32) -> Case {
+pub fn case(field: Field, refractions: u32, reflections: u32) -> Case {
     let settings = settings(field, "four").refractions(refractions).reflections(reflections);
     let camera = camera(Vec3::new(0.5, 0.9, 2.2), Vec3::ZERO, SIZE);
     let empty = crate::shape::empty(0.05);
@@ -80,6 +80,22 @@ fn twin_of(shot: &Shot, case: &Case, frame: &Frame, pixel: usize) -> Walk {
     walk_in(shot, &bricks, own, case, frame, None, pixel)
 }
 
+/// The field that the device has built, as the twin walks in it.
+pub fn twin_field<'a>(
+    shot: &Shot,
+    bricks: &'a std::collections::BTreeMap<[i32; 3], meniscus::layers::field::twin::Brick>,
+    own: Field,
+    radius: f32,
+) -> Twin<'a> {
+    let lattice = meniscus::layers::field::twin::Lattice::new(&own, radius);
+    // Where the liquid's own space begins, on the lattice.
+    let unit = lattice.ball / (1.24 * f64::from(radius));
+    let origin = shot.space.origin * unit / lattice.spacing;
+    // Places count from the first node of the block there.
+    let base = 16 * (origin / 16.0).floor().as_ivec3();
+    Twin::new(bricks, base.to_array(), origin - base.as_dvec3(), f64::from(own.spacing), f64::from(own.level))
+}
+
 fn walk_in(
     shot: &Shot,
     bricks: &std::collections::BTreeMap<[i32; 3], meniscus::layers::field::twin::Brick>,
@@ -89,14 +105,7 @@ fn walk_in(
     scene: Option<Scene>,
     pixel: usize,
 ) -> Walk {
-    let lattice = meniscus::layers::field::twin::Lattice::new(&own, case.particles.radius);
-    // Where the liquid's own space begins, on the lattice.
-    let unit = lattice.ball / (1.24 * f64::from(case.particles.radius));
-    let origin = shot.space.origin * unit / lattice.spacing;
-    // Places count from the first node of the block there.
-    let base = 16 * (origin / 16.0).floor().as_ivec3();
-    let field =
-        Twin::new(bricks, base.to_array(), origin - base.as_dvec3(), f64::from(own.spacing), f64::from(own.level));
+    let field = twin_field(shot, bricks, own, case.particles.radius);
     let none = Map { depth: &[], normal: &[] };
     let view = Maps { frame, maps: [[none; 2]; 2], scene };
     let width = SIZE[0] as usize;

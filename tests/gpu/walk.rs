@@ -26,10 +26,10 @@ const SIZE: [u32; 2] = [240, 180];
 const NEARLY: f32 = 1e-4;
 
 /// The maps that the refraction pass has read.
-struct OwnMaps([[(Vec<f32>, Vec<u32>); 2]; 2]);
+pub struct OwnMaps([[(Vec<f32>, Vec<u32>); 2]; 2]);
 
 impl OwnMaps {
-    fn of(case: &Case, shot: &Shot) -> OwnMaps {
+    pub fn of(case: &Case, shot: &Shot) -> OwnMaps {
         let body = match case.settings.fit().iterations {
             0 => ("body depth (ray-cast)", "body normal (ray-cast)"),
             n if n % 2 == 1 => ("body depth (smoothed, odd)", "body normal (smoothed)"),
@@ -43,7 +43,7 @@ impl OwnMaps {
         }))
     }
 
-    fn twin<'a>(&'a self, shot: &'a Shot) -> Maps<'a> {
+    pub fn twin<'a>(&'a self, shot: &'a Shot) -> Maps<'a> {
         let maps = self.0.each_ref().map(|class| class.each_ref().map(|(depth, normal)| Map { depth, normal }));
         Maps { frame: &shot.frame, maps, scene: None }
     }

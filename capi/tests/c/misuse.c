@@ -323,6 +323,14 @@ static void frames(const Vulkan *vk, MeniscusRenderer *renderer, const MeniscusS
     const MeniscusScene scene = {.struct_size = sizeof scene, .color = picture.view, .depth = picture.view};
     f = good, f.scene = &scene;
     PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "scene colour is in UNDEFINED");
+    MeniscusSurface surface = {.struct_size = sizeof surface, .normal = picture.view, .normal_format = VK_FORMAT_R8G8B8A8_SNORM};
+    f = good, f.surface = &surface;
+    PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "layout of the surface normal is UNDEFINED");
+    surface.normal_layout = VK_IMAGE_LAYOUT_GENERAL;
+    surface.depth = picture.view, surface.depth_format = VK_FORMAT_S8_UINT, surface.depth_layout = VK_IMAGE_LAYOUT_GENERAL;
+    PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "format of the surface depth is S8_UINT");
+    surface.depth = VK_NULL_HANDLE, surface.normal_format = VK_FORMAT_R8G8B8A8_UINT;
+    PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "format of the surface normal is R8G8B8A8_UINT");
     MeniscusPositions positions = {.struct_size = sizeof positions, .count = PARTICLES, .radius = 0.1f};
     f = good, f.positions = &positions;
     PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "buffer of positions is null");

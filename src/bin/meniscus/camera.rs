@@ -1,11 +1,12 @@
 //! Where to look from.
 
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DQuat, DVec2, DVec3, Vec3};
 use meniscus::{Camera, Ellipsoid, Error, Particles};
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// What is said about the camera; world units, in the file's coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct View {
     /// Chosen to frame the liquid if there is none.
@@ -18,11 +19,29 @@ pub struct View {
     pub up: DVec3,
     /// Vertical field of view in degrees.
     pub fov_y: f32,
+    /// What is up in the picture; `up` if there is none.
+    pub upright: Option<DVec3>,
+    /// Where the middle of the picture is beside the view axis: parts of its width to the right, of its height up.
+    pub shift: DVec2,
+    /// Distance before which no liquid is drawn; a tenth of a particle's radius if there is none.
+    pub near: Option<f64>,
+    /// Camera file that decides all of it but `up`: until that is read.
+    pub file: Option<PathBuf>,
 }
 
 impl Default for View {
     fn default() -> View {
-        View { eye: None, target: None, orbit: 0.0, up: DVec3::Y, fov_y: 40.0 }
+        View {
+            eye: None,
+            target: None,
+            orbit: 0.0,
+            up: DVec3::Y,
+            fov_y: 40.0,
+            upright: None,
+            shift: DVec2::ZERO,
+            near: None,
+            file: None,
+        }
     }
 }
 
@@ -35,6 +54,16 @@ impl View {
         // Of a vector too long for its length to be a number the direction is nothing.
         if !self.up.normalize().is_normalized() {
             return Err(wrong("up", self.up.to_string(), "use a finite direction that is not zero"));
+        }
+        if let Some(upright) = self.upright.filter(|u| !u.normalize().is_normalized()) {
+            return Err(wrong("upright", upright.to_string(), "use a finite direction that is not zero"));
+        }
+        if !self.shift.abs().cmple(DVec2::splat(1e4)).all() {
+            return Err(wrong("shift", self.shift.to_string(), "use -10000 to 10000"));
+        }
+        // The renderer has it in single precision.
+        if let Some(near) = self.near.filter(|n| !(*n as f32 > 0.0 && (*n as f32).is_finite())) {
+            return Err(wrong("near", near.to_string(), "use a finite distance above 0"));
         }
         if !self.orbit.is_finite() {
             return Err(wrong("orbit", self.orbit.to_string(), "use a finite number of degrees"));
@@ -72,17 +101,21 @@ pub fn frame(
     let seen_from = if view.orbit == 0.0 { whole_eye } else { whole_target + turned };
     // By way of the file's coordinates also where it was chosen here: given as such it is the same eye.
     let eye = local(seen_from);
-    let whole = View { eye: Some(whole_eye), target: Some(whole_target), ..*view };
+    let whole = View { eye: Some(whole_eye), target: Some(whole_target), ..view.clone() };
     let apart = (target - eye).normalize_or_zero();
     if !(eye.as_vec3().is_finite() && target.as_vec3().is_finite()) || apart == DVec3::ZERO {
         return Err(wrong("eye and target", format!("{eye} and {target}"), "use two different finite points"));
     }
     // Looking straight up or down, any other direction does for "up" on the screen.
-    let screen_up = if apart.cross(up).length() < 1e-3 { apart.any_orthonormal_vector() } else { up };
+    let upright = view.upright.map_or(up, DVec3::normalize);
+    let screen_up = if apart.cross(upright).length() < 1e-3 { apart.any_orthonormal_vector() } else { upright };
     // A point of the line of sight that float32 tells from the eye, however near the target is.
     let ahead = (eye + apart * eye.length().max((target - eye).length())).as_vec3();
     let mut camera = Camera::look_at(eye.as_vec3(), ahead, screen_up.as_vec3(), fov, aspect, near);
     camera.up = up.as_vec3();
+    // Clip space is two wide, and has y down.
+    camera.projection.z_axis.x = 2.0 * view.shift.x as f32;
+    camera.projection.z_axis.y = -2.0 * view.shift.y as f32;
     Ok((camera, eye.as_vec3(), whole))
 }
 

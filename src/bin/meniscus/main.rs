@@ -4,12 +4,14 @@
 
 mod bench;
 mod camera;
+mod camera_file;
 #[cfg(feature = "study")]
 mod chart;
 mod choices;
 mod codes;
 #[cfg(feature = "study")]
 mod compare;
+mod compositing;
 mod dump;
 mod dump_field;
 mod empty;

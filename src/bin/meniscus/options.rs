@@ -1,6 +1,7 @@
 //! Options that `render` and `bench` share: each stands here once, and its default in [`Picture`] or in the library.
 
 use crate::{
+    camera_file::{self, CameraFileError, Cameras},
     choices::{self, Choices},
     picture::{Picture, SUPERSAMPLE},
     scene::Prepare,
@@ -36,6 +37,10 @@ replacing! {
     /// Eye, in the file's coordinates; chosen to frame the liquid if not given
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     eye: DVec3 => camera.eye;
+    /// Camera of another program: .json (docs/blender.md has the script that writes it from Blender) or ParaView's .pvcc. Of its
+    /// frames `sequence` takes each picture's
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "target", "orbit", "fov_y"])]
+    camera: PathBuf => camera.file;
     /// Point to look at; the middle of the liquid if not given
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     target: DVec3 => camera.target;
@@ -78,6 +83,9 @@ pub struct Options {
     /// Of a scene file with keys: the moment, in seconds of the film; 0 if not given
     #[arg(long, value_name = "SECONDS", requires = "scene", value_parser = parse_time)]
     pub time: Option<f64>,
+    /// Of a camera file: the frame, also between two; the camera without frames, or the first, if not given
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = camera_file::parse_frame)]
+    pub camera_frame: Option<f64>,
     #[command(flatten)]
     replacing: Replacing,
     /// Drop particles whose position is not finite instead of failing
@@ -151,8 +159,28 @@ impl Options {
     }
 
     /// A picture with what these options say of it; a method may take the place of theirs.
-    pub fn over(&self, mut picture: Picture, method: Option<&Preset>) -> Result<Picture, meniscus::Error> {
+    pub fn over(&self, picture: Picture, method: Option<&Preset>) -> Result<Picture, Box<dyn Error>> {
+        self.over_seen(picture, method, self.camera_frame, &mut Cameras::default())
+    }
+
+    /// [`Options::over`] as a camera file has it at a frame.
+    pub fn over_seen(
+        &self,
+        mut picture: Picture,
+        method: Option<&Preset>,
+        frame: Option<f64>,
+        cameras: &mut Cameras,
+    ) -> Result<Picture, Box<dyn Error>> {
         self.replacing.apply(&mut picture);
+        picture.size_given |= self.replacing.size.is_some();
+        if self.camera_frame.is_some() && picture.camera.file.is_none() && picture.camera.upright.is_none() {
+            return Err(CameraFileError::NoFile.into());
+        }
+        let Picture { camera, size, size_given, .. } = &mut picture;
+        cameras.follow(camera, frame, size, *size_given)?;
+        // A file's camera comes before what these options say of it.
+        self.replacing.apply(&mut picture);
+        picture.camera.file = None;
         picture.drop_invalid |= self.drop_invalid;
         picture.absorption_given |= self.choices.gives(choices::LEFT_OPEN);
         self.choices.apply(&mut picture.settings, &mut picture.preparation, method)?;

@@ -3,6 +3,7 @@
 use crate::{
     camera::{self, View},
     choices,
+    compositing::{Background, Channels},
     scene::{Prepare, Scene},
 };
 use glam::{DVec3, Vec3};
@@ -40,6 +41,10 @@ pub struct Picture {
     /// Decides how far an environment map is averaged down.
     #[serde(with = "amount")]
     pub max_memory: Budget,
+    /// Of pictures that are written, what is seen where there is no liquid.
+    pub background: Background,
+    /// Of pictures that are written, what they have beside colour.
+    pub channels: Channels,
     pub camera: View,
     pub environment: Environment,
     /// How classes and ellipsoids are made; a support that is not given is the file's.
@@ -48,6 +53,9 @@ pub struct Picture {
     /// Whether the absorption of the settings is meant, or is to suit the liquid's size.
     #[serde(skip)]
     pub absorption_given: bool,
+    /// Whether the size is meant, or is to be a camera file's, if there is one.
+    #[serde(skip)]
+    pub size_given: bool,
 }
 
 /// What is infinitely far away.
@@ -73,11 +81,14 @@ impl Default for Picture {
             supersample: 1,
             size: [1024, 768],
             max_memory: Budget::default(),
+            background: Background::default(),
+            channels: Channels::default(),
             camera: View::default(),
             environment: Environment::default(),
             preparation: prepare::Options::default(),
             settings: Settings::default(),
             absorption_given: false,
+            size_given: false,
         }
     }
 }
@@ -169,7 +180,7 @@ impl Picture {
     /// [`Picture::camera`] of particles relative to an origin.
     pub fn camera_of(&self, origin: DVec3, particles: &Particles) -> Result<(Camera, Vec3, View), Error> {
         let aspect = self.size[0].max(1) as f32 / self.size[1].max(1) as f32;
-        let near = 0.1 * particles.radius;
+        let near = self.camera.near.map_or(0.1 * particles.radius, |n| n as f32);
         let (mut camera, eye, view) = camera::frame(&self.camera, origin, particles, aspect, near)?;
         camera.environment_rotation = self.environment.rotation.to_radians();
         Ok((camera, eye, view))

@@ -1,6 +1,7 @@
 //! `meniscus render`.
 
 use crate::{
+    compositing::{self, Pixels},
     dump, empty, on,
     options::Options,
     outputs,
@@ -28,6 +29,8 @@ pub struct Args {
     pub output: PathBuf,
     #[command(flatten)]
     pub options: Options,
+    #[command(flatten)]
+    pub compositing: compositing::Compositing,
     /// Write all that decides the picture as a scene file (TOML): `render --scene FILE` makes it again
     #[arg(long, value_name = "FILE")]
     pub save_scene: Option<PathBuf>,
@@ -49,6 +52,7 @@ impl Args {
     /// The picture that is asked for: by default, by the scene file, by these arguments.
     fn picture(&self) -> Result<Picture, Box<dyn std::error::Error>> {
         let mut picture = self.options.over(self.options.base()?, None)?;
+        self.compositing.apply(&mut picture);
         picture.particles = self.file.clone().or(picture.particles);
         picture.prepare.get_or_insert(Prepare::Cpu);
         Ok(picture)
@@ -57,6 +61,7 @@ impl Args {
     /// Refuses what cannot be written, before anything is rendered.
     fn check(&self, picture: &Picture) -> Result<(), Box<dyn std::error::Error>> {
         images::check_extension(&self.output)?;
+        compositing::check(picture, [self.output.as_path()])?;
         let mut outputs = vec![("the picture (--output)", self.output.as_path())];
         outputs.extend(self.stats.as_deref().map(|p| ("the statistics (--stats)", p)));
         outputs.extend(self.save_scene.as_deref().map(|p| ("the scene file (--save-scene)", p)));
@@ -153,15 +158,17 @@ fn plan<'a>(args: &'a Args, picture: Picture, scene: &'a Scene) -> Result<Job<'a
 fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dyn std::error::Error>> {
     let upload = job.scene.give(job.picture.preparer(), &job.settings, session)?;
     let (camera, settings) = (job.camera, job.settings);
-    let input = job.scene.input(&camera, &settings, job.eye, upload.as_ref());
+    let input = job.scene.input(&camera, &settings, job.eye, upload.as_ref()).background(job.picture.background.into());
+    session.renderer.inspect(compositing::inspection(&job.picture));
     let mut times = session.frame(&input)?;
     if job.args.stats.is_some() {
         // The first frame compiles shaders; the second is timed.
         times = session.frame(&input)?;
     }
-    let picture = average(&session.picture()?, job.size, job.picture.supersample);
+    let pixels = Pixels::read(session, &job.picture, job.scene.particles.radius)?;
     let output = &job.args.output;
-    outputs::write(output, &images::encode_picture(output, job.picture.size, &picture)?)?;
+    let pixels = pixels.average(job.size, job.picture.supersample);
+    outputs::write(output, &pixels.encode(output, &job.picture, None)?)?;
     if let Some(path) = &job.args.save_scene {
         outputs::write(path, scene_file::text(&job.picture, path)?.as_bytes())?;
     }

@@ -63,6 +63,7 @@ impl SceneFile {
                 message: quote(e.message()),
             }
         })?;
+        camera_table(&mut table);
         let keys = Keys::take(&mut table).map_err(|w| SceneFileError::Key {
             path: path.into(),
             key: quote(&w.key),
@@ -86,7 +87,12 @@ impl SceneFile {
     /// what it says; its paths are relative to itself.
     pub fn at(&self, time: f64) -> Result<Picture, SceneFileError> {
         let path = &self.path;
-        let table = self.keys.at(&self.table, time, |table| Picture::deserialize(table.clone()).is_ok());
+        let mut table = self.keys.at(&self.table, time, |table| Picture::deserialize(table.clone()).is_ok());
+        camera_table(&mut table);
+        if let Some(key) = said_twice(&table) {
+            let message = "the camera file says that: leave one of them out".into();
+            return Err(SceneFileError::Key { path: path.clone(), key: format!("camera.{key}"), message });
+        }
         let given = |key: &str| table.get("settings")?.get("liquid")?.get(key).map(|_| true);
         let absorption_given = given(crate::choices::LEFT_OPEN).unwrap_or(false);
         let mut picture = Picture::deserialize(table.clone()).map_err(|e| {
@@ -94,16 +100,31 @@ impl SceneFile {
             SceneFileError::Key { path: path.into(), key: quote(&key), message: message.replace('\n', " ") }
         })?;
         picture.absorption_given = absorption_given;
+        picture.size_given = table.contains_key("size");
         let method = &mut picture.settings.method;
         let named = |family: &str| table.get("settings")?.get("method")?.get(family).map(|_| true);
         *method = crate::choices::completed(method, |family| named(family).unwrap_or(false));
         picture.validate().map_err(|source| SceneFileError::Value { path: path.into(), source })?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        for file in [&mut picture.particles, &mut picture.environment.file].into_iter().flatten() {
+        let files = [&mut picture.particles, &mut picture.environment.file, &mut picture.camera.file];
+        for file in files.into_iter().flatten() {
             *file = folder.join(&*file);
         }
         Ok(picture)
     }
+}
+
+/// `camera = "camera.json"` is short for a table with a file.
+fn camera_table(table: &mut Table) {
+    if let Some(camera) = table.get_mut("camera").filter(|c| c.is_str()) {
+        *camera = Value::Table(Table::from_iter([("file".to_owned(), camera.clone())]));
+    }
+}
+
+/// What stands beside a camera file that decides it.
+fn said_twice(table: &Table) -> Option<&str> {
+    let camera = table.get("camera")?.as_table().filter(|c| c.contains_key("file"))?;
+    camera.keys().map(String::as_str).find(|key| !["file", "up"].contains(key))
 }
 
 /// The first entry that cannot be read when it stands alone, and why: what reads the whole does not say where it is.
@@ -169,7 +190,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read() {
-        let mut picture = Picture { absorption_given: true, ..Picture::default() };
+        let mut picture = Picture { absorption_given: true, size_given: true, ..Picture::default() };
         picture.settings.method = meniscus::Method::preset("imai16").expect("a preset");
         picture.settings.set("sigma", "0.1").expect("set");
         picture.settings.method.choose("optics", "two").expect("a member");

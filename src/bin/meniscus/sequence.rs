@@ -13,6 +13,7 @@ mod table;
 mod writer;
 
 use crate::{
+    compositing::{self, Pixels},
     empty, on,
     options::Options,
     outputs,
@@ -50,6 +51,8 @@ pub struct Args {
     pub output: Vec<PathBuf>,
     #[command(flatten)]
     pub options: Options,
+    #[command(flatten)]
+    pub compositing: compositing::Compositing,
     /// Only these numbers, such as 10-250 or 10-250:2
     #[arg(long, value_name = "A-B[:STEP]", allow_hyphen_values = true)]
     pub frames: Option<Selection>,
@@ -58,7 +61,7 @@ pub struct Args {
     #[arg(long, value_name = "K/N")]
     pub part: Option<Part>,
     /// The eye goes so many degrees around the target over the sequence: 360 is once around, and the end meets the start
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with = "camera")]
     pub turn: Option<f64>,
     /// Pictures a second, of films and of the time that a scene file's keys count in
     #[arg(long, value_name = "RATE", default_value_t = 25.0, value_parser = rate)]
@@ -180,7 +183,7 @@ fn draw_all(
         let message = match session.as_deref_mut().filter(|_| !shot.kept) {
             None => Message::Kept { shot: index },
             Some(session) => match expose(args, shot, session, ready)? {
-                Ok((pixels, row)) => Message::Drawn { shot: index, pixels, row },
+                Ok((pixels, row)) => Message::Drawn { shot: index, pixels: Box::new(pixels), row },
                 Err(why) if args.keep_going => {
                     failed += 1;
                     bar.suspend(|| terminal::complain(format!("meniscus: picture {}: {why}", shot.number)));
@@ -200,7 +203,7 @@ fn draw_all(
 }
 
 /// A picture of the size rendered at, and its row; or why its frame could not be read or prepared.
-type Exposed = Result<(Vec<[f32; 3]>, Row), String>;
+type Exposed = Result<(Pixels, Row), String>;
 
 fn expose(
     args: &Args,
@@ -209,46 +212,43 @@ fn expose(
     ready: &Receiver<Result<Ready, String>>,
 ) -> Result<Exposed, Box<dyn Error>> {
     let mut row = Row::new(shot);
-    let mut sum: Option<Vec<[f32; 3]>> = None;
+    let mut sum: Option<Pixels> = None;
     for exposure in &shot.exposures {
         let begin = Instant::now();
         let next = ready.recv().map_err(|_| "no frame came from the thread that reads them; report this")?;
         row.waited_ms += ms_since(begin);
-        match next {
+        let pixels = match next {
             Ok(ready) => draw(args, exposure, &ready, session, &mut row)?,
             Err(why) => return Ok(Err(why)),
-        }
-        let pixels = session.picture()?;
+        };
         match &mut sum {
             None => sum = Some(pixels),
-            Some(sum) => add(sum, &pixels),
+            Some(sum) => sum.add(&pixels),
         }
     }
     let mut pixels = sum.ok_or("a picture without an exposure; report this")?;
     if let count @ 2.. = shot.exposures.len() {
-        pixels.as_flattened_mut().iter_mut().for_each(|v| *v /= count as f32);
+        pixels.divide(count);
     }
     Ok(Ok((pixels, row)))
 }
 
-fn add(sum: &mut [[f32; 3]], pixels: &[[f32; 3]]) {
-    sum.as_flattened_mut().iter_mut().zip(pixels.as_flattened()).for_each(|(sum, v)| *sum += v);
-}
-
-/// Draws one moment into the session's picture.
+/// Draws one moment.
 fn draw(
     args: &Args,
     exposure: &Exposure,
     ready: &Ready,
     session: &mut Session,
     row: &mut Row,
-) -> Result<(), Box<dyn Error>> {
+) -> Result<Pixels, Box<dyn Error>> {
     let (picture, scene): (_, &Scene) = (&exposure.picture, &ready.scene);
     let begin = Instant::now();
     let (camera, eye, _) = picture.camera(scene)?;
     let settings = picture.frame_settings(&scene.particles)?;
     let upload = scene.give(picture.preparer(), &settings, session)?;
-    let times = session.frame(&scene.input(&camera, &settings, eye, upload.as_ref()))?;
+    session.renderer.inspect(compositing::inspection(picture));
+    let input = scene.input(&camera, &settings, eye, upload.as_ref()).background(picture.background.into());
+    let times = session.frame(&input)?;
     row.note = empty::explain(session, &scene.particles, &camera, &settings, picture.rendered_size()?)?;
     row.frame_ms += ms_since(begin);
     if args.stats.is_some() {
@@ -256,7 +256,7 @@ fn draw(
         let report = if picture.preparer().on_device() { inspect::report(&session.counters()?) } else { scene.report };
         row.count(scene, &report, ready);
     }
-    Ok(())
+    Ok(Pixels::read(session, picture, scene.particles.radius)?)
 }
 
 fn above_zero(text: &str) -> Result<f64, String> {

@@ -11,8 +11,8 @@ use exr::meta::header::Header;
 use exr::prelude::f16;
 use rayon::prelude::*;
 
-use super::LABEL;
 use super::map::{Fault, Frame, Target};
+use super::{LABEL, Layers};
 use crate::io::guard;
 
 /// Blocks that are unpacked at once, so that every core has some.
@@ -95,15 +95,27 @@ fn block_bytes(header: &Header) -> u64 {
 
 /// A picture of linear light, row by row, as 32-bit floats. The same picture has the same bytes: blocks, which are packed in
 /// parallel, come in the order of their rows.
-pub(super) fn write([width, height]: [u32; 2], rgb: &[[f32; 3]], label: Option<&str>) -> exr::error::Result<Vec<u8>> {
+pub(super) fn write(
+    [width, height]: [u32; 2],
+    layers: &Layers<'_>,
+    label: Option<&str>,
+) -> exr::error::Result<Vec<u8>> {
     use exr::prelude::*;
     let size = Vec2(width as usize, height as usize);
-    let color = |at: Vec2<usize>| <(f32, f32, f32)>::from(rgb[at.y() * size.width() + at.x()]);
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let mut attributes = LayerAttributes::default();
     attributes.other.extend(label.and_then(|l| Some((LABEL.into(), AttributeValue::Text(Text::new_or_none(l)?)))));
-    let layer = Layer::new(size, attributes, encoding, SpecificChannels::rgb(color));
+    let of = |values: &[[f32; 3]], i: usize| FlatSamples::F32(values.iter().map(|v| v[i]).collect());
+    let mut channels: SmallVec<[_; 4]> =
+        ["R", "G", "B"].into_iter().enumerate().map(|(i, name)| AnyChannel::new(name, of(layers.rgb, i))).collect();
+    for (name, values) in [("A", layers.alpha), ("Z", layers.depth)] {
+        channels.extend(values.map(|v| AnyChannel::new(name, FlatSamples::F32(v.to_vec()))));
+    }
+    for (i, name) in ["normal.X", "normal.Y", "normal.Z"].into_iter().enumerate() {
+        channels.extend(layers.normal.map(|n| AnyChannel::new(name, of(n, i))));
+    }
+    let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let mut bytes = std::io::Cursor::new(Vec::new());
     Image::from_layer(layer).write().to_buffered(&mut bytes)?;
     Ok(bytes.into_inner())

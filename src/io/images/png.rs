@@ -65,14 +65,28 @@ impl From<png::DecodingError> for Fault {
 }
 
 /// A picture of sRGB bytes, with a label if there is one.
-pub(super) fn write(
+pub(super) fn write(size: [u32; 2], rgb: &[[u8; 3]], label: Option<&str>) -> Result<Vec<u8>, png::EncodingError> {
+    encode(size, rgb.as_flattened(), ColorType::Rgb, label)
+}
+
+/// The same with straight alpha.
+pub(super) fn write_alpha(
+    size: [u32; 2],
+    rgba: &[[u8; 4]],
+    label: Option<&str>,
+) -> Result<Vec<u8>, png::EncodingError> {
+    encode(size, rgba.as_flattened(), ColorType::Rgba, label)
+}
+
+fn encode(
     [width, height]: [u32; 2],
-    rgb: &[[u8; 3]],
+    samples: &[u8],
+    color: ColorType,
     label: Option<&str>,
 ) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(ColorType::Rgb);
+    encoder.set_color(color);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(png::Filter::Adaptive);
@@ -80,7 +94,7 @@ pub(super) fn write(
         encoder.add_text_chunk(LABEL.into(), label.into())?;
     }
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(rgb.as_flattened())?;
+    writer.write_image_data(samples)?;
     writer.finish()?;
     Ok(bytes)
 }

@@ -125,6 +125,12 @@ impl Frames {
         &self.all
     }
 
+    /// The number of a frame that is so far on the way to the next.
+    pub fn number(&self, index: usize, toward: f64) -> f64 {
+        let number = |i: usize| self.all[i.min(self.all.len() - 1)].number as f64;
+        number(index) + toward * (number(index + 1) - number(index))
+    }
+
     /// When a frame comes, counted in frames from the first; where numbers are missing there is time between.
     pub fn place(&self, index: usize) -> f64 {
         (self.all[index].number - self.all[0].number) as f64 / self.stride as f64

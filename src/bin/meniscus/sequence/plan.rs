@@ -8,11 +8,17 @@ use super::{
     frames::{Frames, FramesError, Pattern},
     kept, table,
 };
-use crate::{outputs, picture::Picture, scene::Prepare};
+use crate::{
+    camera_file::Cameras,
+    compositing::{self, Background},
+    outputs,
+    picture::Picture,
+    scene::Prepare,
+};
 use glam::{DVec3, Vec3};
 use meniscus::io::images;
 use rayon::prelude::*;
-use std::{error::Error, path::PathBuf};
+use std::{cell::RefCell, error::Error, path::PathBuf};
 
 /// One picture of the sequence.
 pub struct Shot {
@@ -85,13 +91,22 @@ impl Settled {
 
 impl Plan {
     pub fn new(args: &Args) -> Result<Plan, Box<dyn Error>> {
+        if args.options.camera_frame.is_some() {
+            return Err("--camera-frame is one frame, and a sequence has many: leave it out".into());
+        }
         if args.options.time.is_some() {
             return Err("--time is one moment, and a sequence has many: leave it out".into());
         }
         let scene_file = args.options.scene_file()?;
         let base = |time| scene_file.as_ref().map_or_else(|| Ok(Picture::default()), |file| file.at(time));
-        let at = |time| -> Result<Picture, Box<dyn Error>> {
-            let mut picture = args.options.over(base(time)?, None)?;
+        let cameras = RefCell::new(Cameras::default());
+        let at = |time, frame| -> Result<Picture, Box<dyn Error>> {
+            let base = base(time)?;
+            if args.turn.is_some() && base.camera.file.is_some() {
+                return Err("--turn goes around a target, and a camera file has none: leave one of them out".into());
+            }
+            let mut picture = args.options.over_seen(base, None, Some(frame), &mut cameras.borrow_mut())?;
+            args.compositing.apply(&mut picture);
             picture.prepare.get_or_insert(Prepare::Cpu);
             Ok(picture)
         };
@@ -119,8 +134,14 @@ impl Plan {
         others.extend(args.options.scene.as_deref().map(|p| ("the scene file (--scene)", p)));
         others.extend(frames.all().iter().map(|f| ("a particle file", f.file.as_path())));
 
-        let picture = at(0.0)?;
+        let picture = at(0.0, frames.number(0, 0.0))?;
         others.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
+        compositing::check(&picture, args.output.iter().map(PathBuf::as_path))?;
+        if let Some(film) = args.output.iter().find(|p| Kind::of(p).is_some() && picture.background == Background::None)
+        {
+            let remedy = "write numbered pictures (out/####.png), or leave out --background none";
+            return Err(format!("{}: films have no transparency: {remedy}", film.display()).into());
+        }
         check(args, &named, &others)?;
         let settled = Settled::of(&picture, &frames)?;
         // All of it over all pictures: a film that begins anew goes on turning.
@@ -129,11 +150,12 @@ impl Plan {
         let made: Vec<_> = pictures.iter().filter(|p| wanted(&p.0)).collect();
         for (number, exposed) in &made[args.part.map_or(0..made.len(), |part| part.range(made.len()))] {
             let expose = |time: &f64| -> Result<_, Box<dyn Error>> {
-                let mut picture = at(*time)?;
+                let moment = times.moment(*time);
+                let mut picture = at(*time, frames.number(moment.frame, moment.toward))?;
                 picture.particles = None;
                 settled.complete(&mut picture);
                 picture.camera.orbit += turn * (time * args.fps);
-                Ok(Exposure { picture, moment: times.moment(*time) })
+                Ok(Exposure { picture, moment })
             };
             let exposures = exposed.iter().map(expose).collect::<Result<Vec<_>, _>>()?;
             let number = *number;

@@ -7,9 +7,9 @@ use super::{
     plan::Plan,
     table::{Row, Table},
 };
-use crate::{outputs, render::average, terminal};
+use crate::{compositing::Pixels, outputs, terminal};
 use indicatif::{ProgressBar, ProgressStyle};
-use meniscus::io::images::{encode_labelled, read_picture, srgb_bytes};
+use meniscus::io::images::{picture_from_bytes, read_picture, srgb_bytes};
 use std::{sync::mpsc::Receiver, time::Instant};
 
 /// What becomes of one picture after the other.
@@ -17,7 +17,7 @@ pub enum Message {
     Drawn {
         shot: usize,
         /// Of the size rendered at.
-        pixels: Vec<[f32; 3]>,
+        pixels: Box<Pixels>,
         row: Row,
     },
     /// It is there already.
@@ -113,24 +113,31 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    fn write(&mut self, index: usize, pixels: &[[f32; 3]], mut row: Row) -> Result<(), Failure> {
+    fn write(&mut self, index: usize, pixels: &Pixels, mut row: Row) -> Result<(), Failure> {
         let shot = &self.plan.shots[index];
         let picture = &shot.exposures[0].picture;
         let begin = Instant::now();
-        let pixels = average(pixels, [0, 1].map(|i| picture.size[i] * picture.supersample), picture.supersample);
+        let pixels = pixels.average([0, 1].map(|i| picture.size[i] * picture.supersample), picture.supersample);
         let encoded: Result<Vec<_>, _> =
-            shot.files.iter().map(|f| encode_labelled(f, picture.size, &pixels, Some(&shot.label))).collect();
+            shot.files.iter().map(|f| pixels.encode(f, picture, Some(&shot.label))).collect();
+        let encoded = encoded?;
         row.encode_ms = ms_since(begin);
         if let Some(why) = row.note.take() {
             self.bar.suspend(|| terminal::complain(format!("meniscus: picture {}: {why}", shot.number)));
         }
-        let bytes = srgb_bytes(&pixels);
+        // Where there is alpha, as what is read again: straight bytes are not to the last bit what they were made of.
+        let bytes = match (shot.files.first(), encoded.first()) {
+            (Some(file), Some(bytes)) if pixels.has_alpha() => {
+                srgb_bytes(&picture_from_bytes(file, bytes, &picture.max_memory)?.1)
+            }
+            _ => srgb_bytes(&pixels.rgb),
+        };
         if let Some(table) = &mut self.table {
             row.change = self.last.as_ref().and_then(|last| change(last, &bytes));
             // Before the picture: one that is there has its row.
             table.add(row)?;
         }
-        for (file, bytes) in shot.files.iter().zip(encoded?) {
+        for (file, bytes) in shot.files.iter().zip(encoded) {
             outputs::write(file, &bytes)?;
         }
         self.film(&bytes)?;

@@ -36,6 +36,9 @@ impl Navigator {
 
     /// The view that it came from, from here.
     pub fn apply(&self, view: &mut View) {
+        if (view.eye, view.target) != (Some(self.eye), Some(self.target)) {
+            view.upright = None; // where another camera was
+        }
         (view.eye, view.target) = (Some(self.eye), Some(self.target));
     }
 

@@ -88,7 +88,7 @@ impl<'a> Viewer<'a> {
             sound: panes.iter().map(|p| p.subject).collect(),
             panes,
             half: 0,
-            start: picture.camera,
+            start: picture.camera.clone(),
             picture,
             environment,
             player,
@@ -140,8 +140,8 @@ impl<'a> Viewer<'a> {
             let size = self.frames.swapchain.size.map(|s| s.max(1));
             let (_, _, view) = Picture { size, ..self.picture.clone() }.camera(scene)?;
             let radius = f64::from(scene.particles.radius);
-            (self.start, self.picture.camera) = (view, view);
             self.navigator = Some(Navigator::new(&view, radius));
+            (self.start, self.picture.camera) = (view.clone(), view);
             if !self.picture.absorption_given {
                 let liquid = self.picture.settings(&scene.particles).liquid;
                 self.picture.absorption_given = true;

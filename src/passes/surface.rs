@@ -1,0 +1,23 @@
+//! What the host is told of the first surface (`glsl/surface.frag`): its depth, its normal, each into an image of the host's.
+
+use crate::{
+    frame::Scene,
+    input::{Says, has_depth, is_halved},
+    plan::{Call, External, Plan, Rendering, Target, Vertices},
+    shader::{SURFACE_DEPTH_AS_COLOR_FRAG, SURFACE_DEPTH_FRAG, SURFACE_NORMAL_FRAG, VIEW_VERT},
+};
+
+/// Draws each that is asked for over what is there.
+pub(crate) fn record(plan: &mut Plan, scene: &Scene, first: Target) {
+    for (says, format) in scene.surface_formats() {
+        let output = plan.given(External::Surface(says, format));
+        let over = Rendering::into(output, 0).keeping(true);
+        let draw = |shader| Call::draw(&VIEW_VERT, shader).read("first_surface", first);
+        let (rendering, call) = match says {
+            Says::Depth if has_depth(format) => (Rendering::over_depth(output), draw(&SURFACE_DEPTH_FRAG)),
+            Says::Depth => (over, draw(&SURFACE_DEPTH_AS_COLOR_FRAG)),
+            Says::Normal => (over, draw(&SURFACE_NORMAL_FRAG).constant("HALVED", is_halved(format))),
+        };
+        plan.render("surface", rendering, vec![(call, Vertices::Direct(3))]);
+    }
+}
