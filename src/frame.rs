@@ -106,6 +106,12 @@ pub(crate) struct Scene<'a> {
     pub output: vk::Format,
     /// Formats of the images that say something of the first surface.
     pub surface: [Option<(Says, vk::Format)>; Says::ALL.len()],
+    /// How it has moved, in this view.
+    pub motions: shader::Motions,
+    /// And by itself, if it does.
+    pub moves: Option<Moves>,
+    /// What the mask of it says.
+    pub reactive: f32,
     /// World to eye.
     pub eye: Mat4,
     /// The liquid's own space; where the device prepares particles only its unit counts.
@@ -139,6 +145,15 @@ pub(crate) struct Preparation {
     pub neighbours: u32,
 }
 
+/// Particles that move, as the pass is told of them.
+#[derive(Clone, Copy)]
+pub(crate) struct Moves {
+    pub count: u32,
+    /// Whether their velocities are known, or where they were.
+    pub velocities: bool,
+    pub block: shader::Moving,
+}
+
 /// Classes that are kept from frame to frame.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Kept {
@@ -163,6 +178,9 @@ impl<'a> Scene<'a> {
             background: Background::Environment,
             output: vk::Format::R32G32B32A32_SFLOAT,
             surface: Default::default(),
+            motions: bytemuck::Zeroable::zeroed(),
+            moves: None,
+            reactive: 0.0,
             eye: Mat4::IDENTITY,
             space: Space::new(1.0, Vec3::ZERO),
             walks: false,

@@ -1,5 +1,6 @@
 //! What the host gives for one frame: particles and camera, its own picture, and where the result goes.
 
+mod motion;
 mod surface;
 
 use crate::{
@@ -8,6 +9,7 @@ use crate::{
     settings::{Camera, Settings},
 };
 use ash::vk;
+pub use motion::{Before, DeviceVectors, Motion, MovingParticles};
 pub(crate) use surface::{Says, has_depth, is_halved};
 pub use surface::{SurfaceOutput, SurfaceOutputs};
 
@@ -115,7 +117,7 @@ pub struct FrameInput<'a> {
     /// Output, of the format given to [`crate::Renderer::new`] and the size given to [`crate::Renderer::resize`], in
     /// `COLOR_ATTACHMENT_OPTIMAL` before and after.
     pub output: vk::ImageView,
-    /// What later passes are told of the first surface: its depth, its normal.
+    /// What later passes are told of the first surface: its depth, its normal, its motion, where it is.
     pub surface: SurfaceOutputs,
 }
 
@@ -153,7 +155,6 @@ impl<'a> FrameInput<'a> {
         if self.output == vk::ImageView::null() {
             return Err(Error::parameter("output", "null", "give the view that is to be drawn into"));
         }
-        self.surface.check()?;
         if let Some(e) = &self.environment {
             check_sampled("environment", e.view, e.layout)?;
         }

@@ -29,8 +29,8 @@
 //!   there. It is the depth buffer's first surface: what that hides from the eye no ray can meet.
 //! * The environment is a map given once ([`Renderer::set_environment`]) or an image view of the host's
 //!   ([`EnvironmentInput`]), equirectangular or a cube.
-//! * Later passes may be told of the first surface that each pixel shows ([`SurfaceOutputs`]): its depth, its normal, in images of
-//!   the host's, over what they hold. What nobody asks for is not done.
+//! * Later passes may be told of the first surface that each pixel shows ([`SurfaceOutputs`]): its depth, its normal, its motion, in
+//!   images of the host's, over what they hold. What nobody asks for is not done.
 //! * Left-handed worlds, viewports of negative height, reversed and infinite depth: see [`Camera`].
 //! * Particles are prepared on the host ([`prepare::prepare`], [`Renderer::set_particles`]; for a density field, which is the
 //!   default, also [`prepare::points`], [`Renderer::set_points`]) or, frame by frame, on the device
@@ -103,7 +103,8 @@ pub use device::Host;
 pub use environment::{Equirect, EquirectBuilder};
 pub use error::Error;
 pub use input::{
-    Background, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput, SurfaceOutput, SurfaceOutputs,
+    Background, Before, DeviceVectors, EnvironmentInput, EnvironmentShape, FrameInput, Motion, MovingParticles,
+    SceneInput, SurfaceOutput, SurfaceOutputs,
 };
 pub use method::{Method, PRESETS, Preset};
 pub use optics::Fresnel;

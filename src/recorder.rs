@@ -33,6 +33,8 @@ pub(crate) struct Externals {
     pub scene: Option<SceneInput>,
     pub output: vk::ImageView,
     pub surface: SurfaceOutputs,
+    /// Particles that move, and how: as positions.
+    pub moving: [(vk::Buffer, u64, u64); 2],
 }
 
 /// One barrier of a recorded frame.
@@ -303,6 +305,8 @@ impl Recorder<'_> {
             }
             Made::Given(External::Positions) => Ok(self.externals.positions),
             Made::Given(External::Ids) => Ok(self.externals.ids),
+            Made::Given(External::MovingPositions) => Ok(self.externals.moving[0]),
+            Made::Given(External::Motions) => Ok(self.externals.moving[1]),
             Made::Given(External::Centers) => all(centers),
             Made::Given(External::Diagonals) => all(diagonals),
             Made::Given(External::Mixed) => all(mixed),

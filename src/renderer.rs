@@ -172,10 +172,14 @@ impl Renderer {
         (scene.output, scene.background) = (self.output, input.background);
         scene.environment = input.environment.map(|e| e.shape);
         scene.surface = input.surface.formats();
+        scene.reactive = input.surface.reactive_value;
         (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
         scene.space = input.positions.map_or(self.scene.space, |p| Space::new(p.radius, Vec3::ZERO));
         if let Some(p) = &input.positions {
             Amount::OnDevice(p).fill(&mut scene)?;
+        }
+        if let Some(motion) = &input.surface.motion {
+            motion.fill(&mut scene, input.camera);
         }
         #[cfg(feature = "inspect")]
         self.inspection.apply(&mut scene);
@@ -218,12 +222,15 @@ impl Renderer {
     /// * The buffer of [`FrameInput::positions`], and that of their ids if they have any, are alive until the frame has
     ///   completed, hold what is said of them, have usage `STORAGE_BUFFER`, and their earlier writes are visible to reads
     ///   in compute shaders. What is written there later waits for the frame's compute shaders.
+    /// * The buffers of [`crate::MovingParticles`] are alive until the frame has completed, have usage `STORAGE_BUFFER`, and their earlier
+    ///   writes are visible to reads in vertex shaders.
     /// * The output, and what there is of the scene, of an environment of the host's and of [`FrameInput::surface`], are alive until
     ///   the frame has completed and in the stated layouts; all but the environment are of this size. Their earlier writes are
     ///   visible to sampling in fragment shaders, and those of the output and of the surface's images to the attachment stages.
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, input: &FrameInput) -> Result<(), Error> {
         input.settings.validate()?;
         input.camera.validate()?;
+        input.surface.check(self.limits.storage_size)?;
         if self.size == [0, 0] {
             return Err(Error::Order("no size yet: call Renderer::resize first"));
         }
@@ -330,6 +337,7 @@ impl Renderer {
             scene: input.scene,
             output: input.output,
             surface: input.surface,
+            moving: input.surface.motion.map(|m| m.bound()).unwrap_or_default(),
         };
         for scale in Scale::ALL {
             let at = scale.offset() as usize;
@@ -417,4 +425,4 @@ const MOST_SLOTS: u32 = 256;
 const FARTHEST_EYE: f32 = 1e12;
 
 /// No device asks for more alignment of a storage buffer's offset.
-const BINDING_ALIGNMENT: u64 = 256;
+pub(crate) const BINDING_ALIGNMENT: u64 = 256;

@@ -369,3 +369,25 @@ struct Splat {
     uint cls;  // which class is drawn
     uint side; // and which side of it
 };
+
+// How far from its center a particle moves the surface, in particle radii: surface lies within about two of the nearest.
+#define MOTION_REACH 3.0
+
+// Push constants of the pass that finds how the first surface moves.
+struct Moving {
+    vec4 eye_x;         // from the world to eye space in particle radii
+    vec4 eye_y;
+    vec4 eye_z;
+    uint first_words;   // where positions begin in their buffer, and in the upper half where what was before does in its own
+    uint word_stride;   // words from one position to the next
+    uint before_stride; // and of what was before
+    float seconds;      // that velocities count for
+};
+
+// Push constants of motion vectors.
+struct Motions {
+    vec4 then_x; // from eye space in particle radii to the frame before's clip space
+    vec4 then_y;
+    vec4 then_w;
+    vec4 now;    // this frame's projection without jitter: scales and shifts of x/d and y/d
+};

@@ -1,5 +1,6 @@
 //! What later passes of the host's are told of the first surface that a pixel shows: images that it passes in.
 
+use super::motion::Motion;
 use crate::Error;
 use ash::vk;
 
@@ -38,6 +39,14 @@ pub struct SurfaceOutputs {
     /// `R16G16B16A16_SFLOAT`, `R16G16B16A16_SNORM`, `R8G8B8A8_SNORM`), as (n + 1) / 2 in others (`A2B10G10R10_UNORM_PACK32`,
     /// `R16G16B16A16_UNORM`, `R8G8B8A8_UNORM`); alpha is 1.
     pub normal: Option<SurfaceOutput>,
+    /// How it has moved since the frame before.
+    pub motion: Option<Motion>,
+    /// A mask that says how little of the pixel's history a temporal upscaler may keep (FSR: reactive, DLSS: bias of the current
+    /// colour): [`SurfaceOutputs::reactive_value`], since what is seen through a surface does not move with it. `R8_UNORM`,
+    /// `R16_SFLOAT` or `R32_SFLOAT`.
+    pub reactive: Option<SurfaceOutput>,
+    /// What the mask says where liquid shows, 0 to 1; FSR advises 0.9 at most.
+    pub reactive_value: f32,
 }
 
 impl SurfaceOutputs {
@@ -53,11 +62,25 @@ impl SurfaceOutputs {
         SurfaceOutputs { normal: normal.into(), ..self }
     }
 
+    /// The same with its motion vectors.
+    #[must_use]
+    pub fn motion(self, motion: impl Into<Option<Motion>>) -> Self {
+        SurfaceOutputs { motion: motion.into(), ..self }
+    }
+
+    /// The same with a mask that says this where it is.
+    #[must_use]
+    pub fn reactive(self, reactive: impl Into<Option<SurfaceOutput>>, value: f32) -> Self {
+        SurfaceOutputs { reactive: reactive.into(), reactive_value: value, ..self }
+    }
+
     /// The image that says this, if it is asked for.
     pub(crate) fn of(&self, says: Says) -> Option<SurfaceOutput> {
         match says {
             Says::Depth => self.depth,
             Says::Normal => self.normal,
+            Says::Motion => self.motion.map(|m| m.output),
+            Says::Reactive => self.reactive,
         }
     }
 
@@ -66,8 +89,8 @@ impl SurfaceOutputs {
         Says::ALL.map(|says| self.of(says).map(|output| (says, output.format)))
     }
 
-    /// What can be told without using them.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    /// What can be told without using them; `largest` is the largest storage buffer.
+    pub(crate) fn check(&self, largest: u64) -> Result<(), Error> {
         for says in Says::ALL {
             let Some(output) = self.of(says) else { continue };
             let [what, format, layout] = says.names();
@@ -83,7 +106,10 @@ impl SurfaceOutputs {
                 return Err(Error::parameter(layout, format!("{:?}", output.layout), remedy));
             }
         }
-        Ok(())
+        if self.reactive.is_some() && !(0.0..=1.0).contains(&self.reactive_value) {
+            return Err(Error::parameter("reactive value", self.reactive_value, "use 0 to 1"));
+        }
+        self.motion.map_or(Ok(()), |m| m.check(largest))
     }
 }
 
@@ -92,16 +118,20 @@ impl SurfaceOutputs {
 pub(crate) enum Says {
     Depth,
     Normal,
+    Motion,
+    Reactive,
 }
 
 impl Says {
-    pub const ALL: [Says; 2] = [Says::Depth, Says::Normal];
+    pub const ALL: [Says; 4] = [Says::Depth, Says::Normal, Says::Motion, Says::Reactive];
 
     /// What the image, its format and its layout are called in errors.
     fn names(self) -> [&'static str; 3] {
         match self {
             Says::Depth => ["surface depth", "format of the surface depth", "layout of the surface depth"],
             Says::Normal => ["surface normal", "format of the surface normal", "layout of the surface normal"],
+            Says::Motion => ["motion vectors", "format of the motion vectors", "layout of the motion vectors"],
+            Says::Reactive => ["reactive mask", "format of the reactive mask", "layout of the reactive mask"],
         }
     }
 
@@ -110,6 +140,8 @@ impl Says {
         match self {
             Says::Depth => has_depth(format) || format == vk::Format::R32_SFLOAT,
             Says::Normal => SIGNED.contains(&format) || HALVED.contains(&format),
+            Says::Motion => VECTORS.contains(&format),
+            Says::Reactive => MASKS.contains(&format),
         }
     }
 
@@ -117,6 +149,8 @@ impl Says {
         match self {
             Says::Depth => "use R32_SFLOAT or a format with depth".into(),
             Says::Normal => format!("use one of {SIGNED:?}, {HALVED:?}"),
+            Says::Motion => format!("use one of {VECTORS:?}"),
+            Says::Reactive => format!("use one of {MASKS:?}"),
         }
     }
 }
@@ -141,6 +175,13 @@ const SIGNED: &[vk::Format] = &[
 ];
 const HALVED: &[vk::Format] =
     &[vk::Format::A2B10G10R10_UNORM_PACK32, vk::Format::R16G16B16A16_UNORM, vk::Format::R8G8B8A8_UNORM];
+const VECTORS: &[vk::Format] = &[
+    vk::Format::R16G16_SFLOAT,
+    vk::Format::R32G32_SFLOAT,
+    vk::Format::R16G16B16A16_SFLOAT,
+    vk::Format::R32G32B32A32_SFLOAT,
+];
+const MASKS: &[vk::Format] = &[vk::Format::R8_UNORM, vk::Format::R16_SFLOAT, vk::Format::R32_SFLOAT];
 
 /// Layouts in which an image can be a colour attachment.
 const COLOR_LAYOUTS: &[vk::ImageLayout] =

@@ -5,6 +5,7 @@ pub(crate) mod compact;
 pub(crate) mod cull;
 pub(crate) mod extent;
 pub(crate) mod first_surface;
+pub(crate) mod motion;
 pub(crate) mod occlude;
 pub(crate) mod shape;
 pub(crate) mod sort;

@@ -334,8 +334,11 @@ fn fits(plan: &Plan, b: &Binding, target: Target) -> Result<(), String> {
         (Some(texels), Made::Given(External::Footprints)) => texels.uint && !texels.array && !texels.cube,
         (None, Made::Own(Spec::Buffer { .. })) => true,
         (None, Made::Given(given)) if b.kind != Kind::TexelBuffer => {
-            use External::{Centers, Diagonals, FrameBlock, Ids, Mixed, Points, Positions, Speeds};
-            matches!(given, FrameBlock(_) | Positions | Ids | Centers | Diagonals | Mixed | Speeds | Points)
+            use External::{
+                Centers, Diagonals, FrameBlock, Ids, Mixed, Motions, MovingPositions, Points, Positions, Speeds,
+            };
+            let particles = matches!(given, Positions | Ids | Centers | Diagonals | Mixed | Speeds | Points);
+            particles || matches!(given, FrameBlock(_) | MovingPositions | Motions)
         }
         _ => false,
     };

@@ -100,6 +100,10 @@ impl Plan {
             External::Output(_) => ("output (host's)", Home::View),
             External::Surface(Says::Depth, _) => ("surface depth (host's)", Home::View),
             External::Surface(Says::Normal, _) => ("surface normal (host's)", Home::View),
+            External::Surface(Says::Motion, _) => ("motion vectors (host's)", Home::View),
+            External::Surface(Says::Reactive, _) => ("reactive mask (host's)", Home::View),
+            External::MovingPositions => ("moving positions (host's)", Home::View),
+            External::Motions => ("motions (host's)", Home::View),
         };
         self.resources.push(Declared { name, home, made: Made::Given(external), per_particle: false });
         Target(self.resources.len() - 1)

@@ -56,6 +56,9 @@ pub(crate) enum External {
     Output(vk::Format),
     /// What the host is told of the first surface.
     Surface(Says, vk::Format),
+    /// Particles that move, and how.
+    MovingPositions,
+    Motions,
 }
 
 /// How a resource comes to be.

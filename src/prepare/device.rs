@@ -72,18 +72,18 @@ impl DeviceIds {
 }
 
 /// Words of a buffer of the host's, one group of them a particle.
-struct Layout {
+pub(crate) struct Words {
     /// Where it stands in an error.
-    offset_of: &'static str,
-    stride_of: &'static str,
-    offset: u64,
-    stride: u64,
+    pub offset_of: &'static str,
+    pub stride_of: &'static str,
+    pub offset: u64,
+    pub stride: u64,
     /// Bytes of one group.
-    bytes: u64,
+    pub bytes: u64,
 }
 
-impl Layout {
-    fn check(&self, count: u32) -> Result<(), Error> {
+impl Words {
+    pub fn check(&self, count: u32) -> Result<(), Error> {
         if !self.offset.is_multiple_of(4) {
             return Err(Error::parameter(self.offset_of, self.offset, "use a multiple of 4 bytes"));
         }
@@ -156,10 +156,10 @@ impl DevicePositions {
         let scale = Scale::new(self.radius, &self.options)?;
         let (offset, stride) = (self.offset, self.stride);
         let [offset_of, stride_of] = ["offset of positions", "stride of positions"];
-        Layout { offset_of, stride_of, offset, stride, bytes: 12 }.check(self.count)?;
+        Words { offset_of, stride_of, offset, stride, bytes: 12 }.check(self.count)?;
         if let Some(DeviceIds { offset, stride, number, .. }) = self.ids {
             let [offset_of, stride_of] = ["offset of ids", "stride of ids"];
-            Layout { offset_of, stride_of, offset, stride, bytes: 4 }.check(self.count)?;
+            Words { offset_of, stride_of, offset, stride, bytes: 4 }.check(self.count)?;
             if number == 0 {
                 return Err(Error::parameter("number of ids", 0, "use one more than the largest id"));
             }

@@ -27,6 +27,7 @@ use glam::{DMat3, Mat3, Vec3};
 
 pub(crate) use density::rest_density;
 pub use density::{DensityField, classify};
+pub(crate) use device::Words;
 pub use device::{DeviceIds, DevicePositions};
 pub use neighbours::Search;
 pub use options::{Fit, Options};

@@ -7,6 +7,7 @@ pub mod cull;
 pub mod extent;
 pub mod field_walk;
 pub mod first_surface;
+pub mod motion;
 pub mod normal;
 pub mod occlude;
 pub mod optics;

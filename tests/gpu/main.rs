@@ -22,6 +22,7 @@ mod host;
 mod layers;
 mod lookup;
 mod methods;
+mod motion;
 mod normals;
 mod occlude;
 mod plan;

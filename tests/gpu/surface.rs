@@ -15,7 +15,7 @@ use meniscus::{
 
 const ATTACHED: Layout = Layout::COLOR_ATTACHMENT_OPTIMAL;
 /// What images hold before the frame: bytes of it all over. As a float 1.5e-10, as parts of 255 47.
-const BEFORE: u8 = 47;
+pub const BEFORE: u8 = 47;
 
 /// Images of the host's for a depth and a normal, in floats.
 pub struct Asked<'a> {
@@ -24,7 +24,7 @@ pub struct Asked<'a> {
 }
 
 /// An image that holds `BEFORE`.
-fn image<'a>(gpu: &'a Gpu<'a>, format: Format, texel: u64, size: [u32; 2], layout: Layout) -> Canvas<'a> {
+pub fn image<'a>(gpu: &'a Gpu<'a>, format: Format, texel: u64, size: [u32; 2], layout: Layout) -> Canvas<'a> {
     let canvas = Canvas::new(gpu, format, texel, size).expect("canvas");
     canvas.write(&vec![BEFORE; (u64::from(size[0] * size[1]) * texel) as usize], layout).expect("written");
     canvas
@@ -44,12 +44,12 @@ impl Asked<'_> {
     }
 }
 
-fn floats(bytes: &[u8]) -> Vec<f32> {
+pub fn floats(bytes: &[u8]) -> Vec<f32> {
     bytes.chunks_exact(4).map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 
 /// Normal and depth in world units of each pixel that shows liquid.
-fn firsts(shot: &Shot) -> Vec<Option<(DVec3, f64)>> {
+pub fn firsts(shot: &Shot) -> Vec<Option<(DVec3, f64)>> {
     let words = shot.floats("first surface", 0).expect("asked for");
     let first = |w: &[f32]| (Vec3::new(w[0], w[1], w[2]).as_dvec3(), f64::from(w[3]) * shot.space.radius);
     words.chunks_exact(4).map(|w| (w[3] != 0.0).then(|| first(w))).collect()
@@ -119,7 +119,7 @@ fn depths_are_those_of_the_hosts_projection() {
                     assert!((f64::from(depths[i]) - wanted).abs() < 1e-6, "{label}: {} and {wanted}", depths[i]);
                     assert_eq!(normal, [n.x as f32, n.y as f32, n.z as f32, 1.0], "{label}: pixel {i}");
                     // Where the ball is: its own normal, in the world.
-                    let x = position(&camera, i, *d);
+                    let x = position(&camera, SIZE, i, *d);
                     assert!((x.normalize() - *n).length() < 2e-3, "{label}: pixel {i}: {x} and {n}");
                 }
                 if before {
@@ -140,11 +140,10 @@ fn depths_are_those_of_the_hosts_projection() {
 }
 
 /// Where in the world a pixel's view ray is so deep.
-fn position(camera: &Camera, pixel: usize, depth: f64) -> DVec3 {
-    let size = SIZE.map(f64::from);
-    let at = [(pixel as u32 % SIZE[0]) as f64 + 0.5, (pixel as u32 / SIZE[0]) as f64 + 0.5];
+pub fn position(camera: &Camera, size: [u32; 2], pixel: usize, depth: f64) -> DVec3 {
+    let at = [(pixel as u32 % size[0]) as f64 + 0.5, (pixel as u32 / size[0]) as f64 + 0.5];
     let p = camera.projection.as_dmat4();
-    let across = |k: usize| (2.0 * at[k] / size[k] - 1.0 + p.z_axis[k]) / p.col(k)[k] * depth;
+    let across = |k: usize| (2.0 * at[k] / f64::from(size[k]) - 1.0 + p.z_axis[k]) / p.col(k)[k] * depth;
     let eye = DVec3::new(across(0), across(1), -depth);
     camera.view.as_dmat4().inverse().transform_point3(eye)
 }
@@ -254,7 +253,7 @@ fn has(gpu: &Gpu, format: Format) -> bool {
 }
 
 /// What a frame with such outputs is refused with.
-fn refused(driver: &Driver, case: &Case, asked: impl Fn(SurfaceOutputs) -> SurfaceOutputs) -> String {
+pub fn refused(driver: &Driver, case: &Case, asked: impl Fn(SurfaceOutputs) -> SurfaceOutputs) -> String {
     driver.give(case);
     let mut session = driver.session.borrow_mut();
     session.resize(case.size).expect("size");
