@@ -4,6 +4,7 @@ mod bench;
 mod between;
 mod drivers;
 mod films;
+mod installed;
 mod keys;
 mod outputs;
 mod pipelines;

@@ -117,6 +117,28 @@ fn planted_mistakes_can_be_planted() {
     assert!(found > 50, "only {found}");
 }
 
+/// The container is CI's own image with what setup.sh installs, and names no package itself.
+#[test]
+fn the_container_is_what_setup_installs() {
+    let read = |name: &str| fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let text = read("Dockerfile");
+    let lines = text.lines().filter(|l| !l.is_empty() && !l.starts_with('#'));
+    let steps: Vec<_> = lines.map(|l| l.split_once(' ').expect("an instruction and what it is told")).collect();
+    let of = |name: &str| steps.iter().filter(|s| s.0 == name).map(|s| s.1.trim()).collect::<Vec<_>>();
+    let known = ["FROM", "RUN", "WORKDIR", "COPY", "CMD"];
+    assert!(steps.iter().all(|s| known.contains(&s.0)) && steps[0].0 == "FROM", "{steps:?}");
+    assert!(read(".github/workflows/ci.yml").contains(&format!("image: [\"{}\"", of("FROM")[0])), "CI's image");
+    assert_eq!(of("RUN").last(), Some(&"./setup.sh"));
+    assert!(!of("RUN").iter().any(|run| ["apt", "dpkg"].iter().any(|word| run.contains(word))), "{steps:?}");
+    // Nothing else of the checkout is sent to whoever builds the image.
+    let sent = read(".dockerignore");
+    for copied in of("COPY") {
+        let (file, _) = copied.split_once(' ').expect("from and to");
+        assert!(root().join(file).exists() && sent.lines().any(|l| l.strip_prefix('!') == Some(file)), "{file}");
+    }
+    assert!(!of("COPY").is_empty() && sent.starts_with("*\n"), "{sent}");
+}
+
 /// Macros that panic where what they write cannot be written: the library says nothing, and the command says what it has
 /// to say through src/bin/meniscus/terminal.rs.
 #[test]

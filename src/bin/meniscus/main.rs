@@ -10,11 +10,13 @@ mod choices;
 mod codes;
 #[cfg(feature = "study")]
 mod compare;
+mod completions;
 mod dump;
 mod dump_field;
 mod empty;
 mod info;
 mod keys;
+mod man;
 mod options;
 mod outputs;
 mod picture;
@@ -81,6 +83,10 @@ enum Command {
     View(Box<view::Args>),
     /// Print what a driver's compiler makes of a method's shaders: registers, spills, occupancy; needs no GPU
     Pipelines(Box<pipelines::Args>),
+    /// Print what a shell needs to complete command lines
+    Completions(completions::Args),
+    /// Write manual pages
+    Man(man::Args),
     /// List devices, drivers, features, limits and file formats.
     Info,
 }
@@ -122,6 +128,8 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),
         Command::Pipelines(args) => pipelines::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
         Command::Info => info::run(),
     }
 }
