@@ -93,6 +93,7 @@ pub mod study;
 mod table;
 #[cfg(feature = "inspect")]
 pub mod twin;
+pub mod work;
 
 // Of the versions whose types stand in the public interface.
 pub use {ash, glam, gpu_allocator};

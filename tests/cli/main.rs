@@ -22,6 +22,7 @@ mod study;
 mod terminal;
 #[cfg(feature = "study")]
 mod tune;
+mod workload;
 
 use std::{
     fs,

@@ -38,6 +38,7 @@ mod truth;
 mod tune;
 #[cfg(feature = "view")]
 mod view;
+mod workload;
 
 use clap::{Parser, Subcommand, error::ContextValue};
 use meniscus::host::{DeviceInfo, HostError, Instance};
@@ -83,6 +84,8 @@ enum Command {
     View(Box<view::Args>),
     /// Print what a driver's compiler makes of a method's shaders: registers, spills, occupancy; needs no GPU
     Pipelines(Box<pipelines::Args>),
+    /// Draw a fixed set of frames and print every draw and dispatch of them: for simulators, traces and modified drivers
+    Workload(workload::Args),
     /// Print what a shell needs to complete command lines
     Completions(completions::Args),
     /// Write manual pages
@@ -128,6 +131,7 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),
         Command::Pipelines(args) => pipelines::run(&args),
+        Command::Workload(args) => workload::run(&args),
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => man::run(&args),
         Command::Info => info::run(),
