@@ -54,6 +54,8 @@ pub mod device;
 pub mod environment;
 pub mod error;
 mod frame;
+#[cfg(feature = "harness")]
+pub mod harness;
 #[cfg(feature = "host")]
 pub mod host;
 pub mod input;
