@@ -13,8 +13,9 @@ packages=(build-essential binutils libvulkan1 mesa-vulkan-drivers vulkan-validat
           python3
           # What a window loads when it starts, and a display without a screen to test it in.
           libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 xvfb)
-# SwiftShader, a second Vulkan driver, comes with Debian's Chromium; Ubuntu ships that as a snap, without it.
-optional=(chromium-common)
+# SwiftShader, a second Vulkan driver, comes with Debian's Chromium; Ubuntu ships that as a snap, without it. A test captures
+# frames with gfxreconstruct.
+optional=(chromium-common gfxreconstruct)
 
 missing() { ! dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q 'ok installed'; }
 wanted=(); for p in "${packages[@]}"; do missing "$p" && wanted+=("$p"); done
@@ -26,7 +27,7 @@ if [ ${#wanted[@]} -gt 0 ] || [ ${#extra[@]} -gt 0 ]; then
   [ ${#wanted[@]} = 0 ] || "${as_root[@]}" apt-get install -y -qq --no-install-recommends "${wanted[@]}" >/dev/null
   for p in "${extra[@]}"; do
     "${as_root[@]}" apt-get install -y -qq --no-install-recommends "$p" >/dev/null 2>&1 ||
-      { mkdir -p target; touch "target/no-$p"; echo "setup: $p is not to be had here; tests run on the other drivers" >&2; }
+      { mkdir -p target; touch "target/no-$p"; echo "setup: $p is not to be had here; tests do without it" >&2; }
   done
 fi
 

@@ -56,6 +56,8 @@ pub mod device;
 pub mod environment;
 pub mod error;
 mod frame;
+#[cfg(feature = "harness")]
+pub mod harness;
 #[cfg(feature = "host")]
 pub mod host;
 pub mod input;
@@ -95,6 +97,7 @@ pub mod study;
 mod table;
 #[cfg(feature = "inspect")]
 pub mod twin;
+pub mod work;
 
 // Of the versions whose types stand in the public interface.
 pub use {ash, glam, gpu_allocator};

@@ -11,6 +11,7 @@ use crate::{
     resources::Resource,
     shader::{self, Binding, Kind},
     table::Table,
+    work::{Command, WorkEntry},
 };
 use ash::vk;
 
@@ -67,6 +68,8 @@ pub(crate) struct Recorder<'a> {
     pub pool: vk::DescriptorPool,
     pub profiler: Option<&'a mut Profiler>,
     pub barriers: &'a mut Vec<PlanEntry>,
+    /// What the device is given to do.
+    pub work: &'a mut Vec<WorkEntry>,
     /// What has happened to the frame block since the host wrote it.
     pub frame_block: State,
 }
@@ -109,18 +112,26 @@ impl Recorder<'_> {
                 // SAFETY: `cmd` is recording outside rendering; the range lies inside the buffer, whose use as the
                 // destination of a transfer was declared with this step.
                 unsafe { device.cmd_fill_buffer(cmd, handle, *offset, *bytes, *word) };
+                let whole = self.plan.bytes(*buffer).filter(|_| *bytes == vk::WHOLE_SIZE);
+                let command = Command::Fill { bytes: whole.map_or(*bytes, |all| all - offset) };
+                self.work.push(WorkEntry { pass: step.pass, shader: "", command });
             }
             Work::Dispatch { call, groups } => {
                 self.bind(step.pass, call)?;
-                match groups {
-                    // SAFETY: a compute pipeline, its set and its constants are bound.
-                    Groups::Direct([x, y, z]) => unsafe { device.cmd_dispatch(cmd, *x, *y, *z) },
-                    Groups::Indirect(arguments, offset) => {
-                        let handle = self.buffer(*arguments)?.0;
-                        // SAFETY: as above; the arguments were declared as such with this step.
-                        unsafe { device.cmd_dispatch_indirect(cmd, handle, *offset) };
+                let command = match *groups {
+                    Groups::Direct([x, y, z]) => {
+                        // SAFETY: a compute pipeline, its set and its constants are bound.
+                        unsafe { device.cmd_dispatch(cmd, x, y, z) };
+                        Command::Dispatch { groups: [x, y, z] }
                     }
-                }
+                    Groups::Indirect(arguments, offset) => {
+                        let handle = self.buffer(arguments)?.0;
+                        // SAFETY: as above; the arguments were declared as such with this step.
+                        unsafe { device.cmd_dispatch_indirect(cmd, handle, offset) };
+                        Command::DispatchIndirect { buffer: self.plan.resource(arguments).name, offset }
+                    }
+                };
+                self.work.push(WorkEntry { pass: step.pass, shader: call.recipe.name(), command });
             }
             Work::Render { rendering, draws } => {
                 self.begin_rendering(rendering)?;
@@ -134,22 +145,33 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    fn draw(&self, pass: &'static str, rendering: &Rendering, call: &Call, vertices: &Vertices) -> Result<(), Error> {
+    fn draw(
+        &mut self,
+        pass: &'static str,
+        rendering: &Rendering,
+        call: &Call,
+        vertices: &Vertices,
+    ) -> Result<(), Error> {
         let (device, cmd) = (&self.host.device, self.cmd);
         self.bind(pass, call)?;
         if let Some(depth) = &rendering.depth {
             // SAFETY: `cmd` is recording, and the pipeline has this state as a dynamic one.
             unsafe { device.cmd_set_depth_compare_op(cmd, depth.compare) };
         }
-        match vertices {
-            // SAFETY: inside rendering, with a graphics pipeline, its set and its constants bound.
-            Vertices::Direct(count) => unsafe { device.cmd_draw(cmd, *count, 1, 0, 0) },
-            Vertices::Indirect(arguments, offset) => {
-                let handle = self.buffer(*arguments)?.0;
-                // SAFETY: as above; the arguments were declared as such with this step.
-                unsafe { device.cmd_draw_indirect(cmd, handle, *offset, 1, 0) };
+        let command = match *vertices {
+            Vertices::Direct(count) => {
+                // SAFETY: inside rendering, with a graphics pipeline, its set and its constants bound.
+                unsafe { device.cmd_draw(cmd, count, 1, 0, 0) };
+                Command::Draw { vertices: count }
             }
-        }
+            Vertices::Indirect(arguments, offset) => {
+                let handle = self.buffer(arguments)?.0;
+                // SAFETY: as above; the arguments were declared as such with this step.
+                unsafe { device.cmd_draw_indirect(cmd, handle, offset, 1, 0) };
+                Command::DrawIndirect { buffer: self.plan.resource(arguments).name, offset }
+            }
+        };
+        self.work.push(WorkEntry { pass, shader: call.recipe.name(), command });
         Ok(())
     }
 

@@ -18,6 +18,7 @@ use crate::{
     slot::Slot,
     space::{self, Space},
     table::Table,
+    work::WorkEntry,
 };
 pub use ahead::Amount;
 use ahead::check_memory;
@@ -50,6 +51,7 @@ pub struct Renderer {
     scene: SceneBounds,
     environment: Option<Footprints>,
     pub(crate) barriers: Vec<PlanEntry>,
+    work: Vec<WorkEntry>,
     /// What is also written, for dumps and statistics.
     #[cfg(feature = "inspect")]
     pub(crate) inspection: crate::inspect::Inspection,
@@ -126,6 +128,7 @@ impl Renderer {
             },
             environment: None,
             barriers: Vec::new(),
+            work: Vec::new(),
             #[cfg(feature = "inspect")]
             inspection: Default::default(),
             #[cfg(feature = "inspect")]
@@ -348,6 +351,7 @@ impl Renderer {
             p.begin_frame(&self.host.device, cmd);
         }
         self.barriers.clear();
+        self.work.clear();
         let recorder = Recorder {
             host: &self.host,
             cmd,
@@ -358,6 +362,7 @@ impl Renderer {
             pool: slot.pool,
             profiler: slot.profiler.as_mut(),
             barriers: &mut self.barriers,
+            work: &mut self.work,
             frame_block: access::State::default(),
         };
         let recorded = recorder.record();
@@ -388,6 +393,11 @@ impl Renderer {
     /// The barriers of the last recorded frame, in order; printable.
     pub fn plan(&self) -> &[PlanEntry] {
         &self.barriers
+    }
+
+    /// What the last recorded frame gives the device to do, in order: its fills, dispatches and draws.
+    pub fn work(&self) -> &[WorkEntry] {
+        &self.work
     }
 
     /// GPU times of the frame last recorded into a slot, which has completed; `None` before the first, or without

@@ -7,6 +7,7 @@ mod compositing;
 mod drivers;
 mod films;
 mod info;
+mod installed;
 mod keys;
 mod outputs;
 mod pipelines;
@@ -25,6 +26,7 @@ mod submit;
 mod terminal;
 #[cfg(feature = "study")]
 mod tune;
+mod workload;
 
 use std::{
     fs,

@@ -1,6 +1,7 @@
 //! The house's own rules: a pass has its files, no file grows past what can be read, licences are permissive.
 
 use std::{fs, path::Path};
+use yaml_rust2::YamlLoader;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -117,11 +118,62 @@ fn planted_mistakes_can_be_planted() {
     assert!(found > 50, "only {found}");
 }
 
+/// The container is CI's own image with what setup.sh installs, and names no package itself.
+#[test]
+fn the_container_is_what_setup_installs() {
+    let read = |name: &str| fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let text = read("Dockerfile");
+    let lines = text.lines().filter(|l| !l.is_empty() && !l.starts_with('#'));
+    let steps: Vec<_> = lines.map(|l| l.split_once(' ').expect("an instruction and what it is told")).collect();
+    let of = |name: &str| steps.iter().filter(|s| s.0 == name).map(|s| s.1.trim()).collect::<Vec<_>>();
+    let known = ["FROM", "RUN", "WORKDIR", "COPY", "CMD"];
+    assert!(steps.iter().all(|s| known.contains(&s.0)) && steps[0].0 == "FROM", "{steps:?}");
+    assert!(read(".github/workflows/ci.yml").contains(&format!("image: [\"{}\"", of("FROM")[0])), "CI's image");
+    assert_eq!(of("RUN").last(), Some(&"./setup.sh"));
+    assert!(!of("RUN").iter().any(|run| ["apt", "dpkg"].iter().any(|word| run.contains(word))), "{steps:?}");
+    // Nothing else of the checkout is sent to whoever builds the image.
+    let sent = read(".dockerignore");
+    for copied in of("COPY") {
+        let (file, _) = copied.split_once(' ').expect("from and to");
+        assert!(root().join(file).exists() && sent.lines().any(|l| l.strip_prefix('!') == Some(file)), "{file}");
+    }
+    assert!(!of("COPY").is_empty() && sent.starts_with("*\n"), "{sent}");
+}
+
+/// The workflow for others is one: it installs some of what setup.sh does, and runs tests on a driver that it names.
+#[test]
+fn the_workflow_for_others_can_be_copied() {
+    let read = |name: &str| fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let all = YamlLoader::load_from_str(&read("docs/ci/lavapipe.yml")).expect("YAML");
+    let [file] = &all[..] else { panic!("{} documents", all.len()) };
+    assert!(file["name"].as_str().is_some() && file["on"].as_vec().is_some_and(|on| !on.is_empty()));
+    let jobs: Vec<_> = file["jobs"].as_hash().expect("jobs").values().collect();
+    let [job] = jobs[..] else { panic!("{} jobs", jobs.len()) };
+    assert!(job["runs-on"].as_str().is_some_and(|on| on.starts_with("ubuntu-")));
+    let driver = job["env"]["MENISCUS_DRIVERS"].as_str().expect("a driver");
+    assert!(read(".ci/run").contains(&format!("drivers=({driver})")), "{driver} is not what CI runs on");
+    assert!(read("src/harness/drivers.rs").contains("\"MENISCUS_DRIVERS\""), "nobody reads it");
+    let steps = job["steps"].as_vec().expect("steps");
+    assert!(steps.iter().all(|s| s["run"].as_str().is_some() != s["uses"].as_str().is_some()), "{steps:?}");
+    let runs: Vec<_> = steps.iter().filter_map(|s| s["run"].as_str()).collect();
+    assert!(runs.contains(&"cargo test"), "{runs:?}");
+    let setup = read("setup.sh");
+    let needed = setup.split("packages=(").nth(1).and_then(|s| s.split(')').next()).expect("a list");
+    let install = runs.iter().find_map(|r| r.split("--no-install-recommends").nth(1)).expect("packages");
+    let packages: Vec<_> = install.split_whitespace().collect();
+    assert!(packages.len() >= 3, "{packages:?}");
+    assert!(packages.iter().all(|p| needed.split_whitespace().any(|n| n == *p)), "{packages:?}");
+}
+
 /// Macros that panic where what they write cannot be written: the library says nothing, and the command says what it has
 /// to say through src/bin/meniscus/terminal.rs.
 #[test]
 fn nothing_is_printed_past_the_terminal() {
     walk(&root().join("src"), &mut |path| {
+        // It runs in tests, which show what a macro prints with the test that failed.
+        if path.starts_with(root().join("src/harness")) {
+            return;
+        }
         let text = fs::read_to_string(path).expect("UTF-8");
         for word in ["print!(", "println!(", "dbg!("] {
             assert!(!text.contains(word), "{} has {word}", path.display());

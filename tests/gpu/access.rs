@@ -1,9 +1,6 @@
 //! Barriers: what the passes declare becomes what they need, and validation would say so if it did not.
 
-use crate::{
-    drivers::SKY,
-    support::{Choose, camera, each_driver, imai16, random_cloud},
-};
+use crate::support::{Choose, SKY, camera, each_driver, imai16, random_cloud};
 use ash::vk::{self, AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};
 use glam::Vec3;
 use meniscus::FrameInput;

@@ -1,9 +1,6 @@
 //! `Auto` on frames of a device: what is too slow gives way, and nothing is compiled for it.
 
-use crate::{
-    drivers::SKY,
-    support::{Choose, camera, each_driver, imai16, random_cloud},
-};
+use crate::support::{Choose, SKY, camera, each_driver, imai16, random_cloud};
 use glam::Vec3;
 use meniscus::{
     FrameInput, Method,

@@ -3,9 +3,8 @@
 
 use crate::{
     analytic::{Quadric, SIZE, case, pixels, settings, snell, view, within},
-    drivers::SKY,
     host::{self, with_renderer},
-    support::{Choose, Driver, each_driver, imai16, random_cloud, sphere},
+    support::{Choose, Driver, SKY, each_driver, imai16, random_cloud, sphere},
     walk::degrees,
 };
 use ash::vk;

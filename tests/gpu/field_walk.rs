@@ -3,9 +3,8 @@
 use crate::{
     analytic::{self, Pixel, pixels, snell},
     background::{HostScene, painted},
-    drivers::SKY,
     field::{prepared, settings, words},
-    support::{Case, Choose, Driver, Random, Shot, camera, each_driver},
+    support::{Case, Choose, Driver, Random, SKY, Shot, camera, each_driver},
     walk::degrees,
 };
 use glam::{DVec3, Vec3};

@@ -5,13 +5,12 @@
 
 use crate::{
     background::{HostScene, painted},
-    drivers,
     support::{Case, Choose, Driver, camera, each_driver, imai16, lattice, random_cloud},
 };
 use glam::Vec3;
-use image::{ImageBuffer, Rgb};
 use meniscus::{
     Ellipsoid, FrameInput, Method, PRESETS, Particles,
+    harness::{Goldens, Reference, Tolerance},
     host::Upload,
     inspect::Inspection,
     prepare::{DevicePositions, Search},
@@ -20,58 +19,11 @@ use std::path::{Path, PathBuf};
 
 const SIZE: [u32; 2] = [96, 72];
 
-/// A picture of 16 bits a channel: c = sqrt(v / (1 + v)) of linear light v, which any viewer shows well enough, and in which
-/// the sun weighs no more than what is seen by its light. Linear light is c^2 / (1 - c^2), to about a ten-thousandth; floats
-/// would say the same at several times the size, and the tolerances, which have to bound both the sun and what is dark, would
-/// be in this code all the same.
-type Golden = ImageBuffer<Rgb<u16>, Vec<u16>>;
-
-fn encode(v: f32) -> f32 {
-    (v / (1.0 + v)).sqrt()
-}
-
-/// How far two pictures may be apart, in units of white (1 is infinitely bright). Drivers round otherwise, and a rounding
-/// error that decides which way a ray goes changes its pixel altogether: so a share of the pixels may differ by more than
-/// `near`, and none by more than `far`; the mean includes them all.
-#[derive(Clone, Copy)]
-struct Tolerance {
-    mean: f32,
-    near: f32,
-    share: f32,
-    far: f32,
-}
-
 /// What one refraction shows follows from the first surface alone.
 const FIRST: Tolerance = Tolerance { mean: 6e-4, near: 0.02, share: 2e-3, far: 0.1 };
 /// Rays that leave through walls, and the walls' edges. Lavapipe and SwiftShader are 3e-4 apart in the mean, and more than
 /// `near` at one pixel in a thousand, by 0.16 at most.
 const WALKED: Tolerance = Tolerance { mean: 6e-4, near: 0.02, share: 1e-2, far: 0.4 };
-
-/// What is too far off in a picture, if anything.
-fn compare(golden: &Golden, picture: &[[f32; 3]], tolerance: Tolerance) -> Result<String, String> {
-    if golden.dimensions() != (SIZE[0], SIZE[1]) || picture.len() != (SIZE[0] * SIZE[1]) as usize {
-        return Err(format!("{:?} pixels, and {}", golden.dimensions(), picture.len()));
-    }
-    // Comparisons with what is no number are false, and means of it are none.
-    if let Some(i) = picture.iter().position(|c| !c.iter().all(|v| v.is_finite() && *v >= 0.0)) {
-        return Err(format!("pixel {i} is {:?}", picture[i]));
-    }
-    let off = |(want, got): (&Rgb<u16>, &[f32; 3])| {
-        (0..3).map(|k| (f32::from(want[k]) / 65535.0 - encode(got[k])).abs()).fold(0.0, f32::max)
-    };
-    let off: Vec<f32> = golden.pixels().zip(picture).map(off).collect();
-    let count = off.len() as f32;
-    let mean = off.iter().sum::<f32>() / count;
-    let share = off.iter().filter(|d| **d > tolerance.near).count() as f32 / count;
-    let most = off.iter().copied().fold(0.0, f32::max);
-    let said = format!(
-        "off by {mean:.5} in the mean, {most:.3} at most; {:.2} % by more than {}",
-        100.0 * share,
-        tolerance.near
-    );
-    let fine = mean <= tolerance.mean && share <= tolerance.share && most <= tolerance.far;
-    if fine { Ok(said) } else { Err(said) }
-}
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/goldens")
@@ -79,19 +31,7 @@ fn folder() -> PathBuf {
 
 /// Compares with the picture of this name, or makes it where MENISCUS_BLESS says so.
 fn check(driver: &Driver, name: &str, picture: &[[f32; 3]], tolerance: Tolerance) {
-    let path = folder().join(format!("{name}.png"));
-    if std::env::var_os("MENISCUS_BLESS").is_some_and(|v| v == "1") {
-        assert_eq!(drivers::count(), 1, "one driver makes the pictures: say which with MENISCUS_DRIVERS");
-        let codes = picture.iter().flatten().map(|v| (65535.0 * encode(*v)).round() as u16).collect();
-        Golden::from_raw(SIZE[0], SIZE[1], codes).expect("three codes a pixel").save(&path).expect("written");
-        std::fs::write(path.with_extension("txt"), format!("{}\n", driver.name)).expect("written");
-    }
-    let golden = image::open(&path).unwrap_or_else(|e| panic!("{name}: {e}: look at tests/gpu/goldens.rs"));
-    let maker = std::fs::read_to_string(path.with_extension("txt")).expect("the driver that made it");
-    match compare(&golden.into_rgb16(), picture, tolerance) {
-        Ok(said) => println!("{}: {name}: {said}", driver.name),
-        Err(said) => panic!("{}: {name} (made by {}): {said}", driver.name, maker.trim()),
-    }
+    Goldens::new(folder()).check(&driver.name, name, SIZE, picture, tolerance);
 }
 
 /// The picture alone, from the programs that a caller's frames use: `shoot` draws with those that write targets, too.
@@ -229,10 +169,9 @@ fn an_eye_inside() {
 /// The comparison sees what it is there for.
 #[test]
 fn wrong_pictures_are_told_from_right_ones() {
-    let golden = image::open(folder().join("dam_break_4.png")).expect("a golden").into_rgb16();
-    let decode = |c: u16| (f32::from(c) / 65535.0).powi(2) / (1.0 - (f32::from(c) / 65535.0).powi(2));
-    let right: Vec<[f32; 3]> = golden.pixels().map(|p| p.0.map(decode)).collect();
-    let judge = |picture: &[[f32; 3]]| compare(&golden, picture, WALKED);
+    let golden = Reference::open(&folder().join("dam_break_4.png")).expect("a golden");
+    let right = golden.picture();
+    let judge = |picture: &[[f32; 3]]| golden.compare(picture, WALKED);
     judge(&right).expect("itself");
     let wrong = |what: &str, change: &dyn Fn(usize, [f32; 3]) -> [f32; 3]| {
         let picture: Vec<_> = right.iter().enumerate().map(|(i, c)| change(i, *c)).collect();

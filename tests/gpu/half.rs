@@ -2,8 +2,7 @@
 
 use crate::{
     background::{HostScene, painted},
-    drivers::SKY,
-    support::{Case, Cloud, Driver, Shot, camera, each_driver, lattice, random_cloud},
+    support::{Case, Cloud, Driver, SKY, Shot, camera, each_driver, lattice, random_cloud},
 };
 use glam::{DVec2, DVec3, Mat3, Vec3};
 use meniscus::{

@@ -1,9 +1,9 @@
 //! The contract with the host: frames in flight, replaced resources, host scenes, output formats.
 
-use crate::drivers::SKY;
 use crate::support::{Case, Choose, Cloud, Driver, camera, each_driver, imai16, random_cloud, sphere};
 use ash::vk::{self, Handle};
 use glam::Vec3;
+use meniscus::harness::SKY;
 use meniscus::{
     Error, FrameInput, Particles, Renderer, SceneInput,
     host::{Canvas, Gpu, HostError, Upload},

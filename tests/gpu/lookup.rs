@@ -4,10 +4,9 @@ use crate::{
     analytic::{Quadric, snell},
     background::{HostScene, Painted, linear_cube, linear_light, painted},
     cull::around_the_near_plane,
-    drivers::SKY,
     host::{self, with_renderer},
     splat,
-    support::{Case, Driver, Shot, camera, each_driver, imai16, random_cloud, sphere},
+    support::{Case, Driver, SKY, Shot, camera, each_driver, imai16, random_cloud, sphere},
 };
 use ash::vk;
 use glam::{DVec2, DVec3, Mat3, Vec3};

@@ -2,8 +2,7 @@
 
 use crate::{
     cull::{around_the_near_plane, both, drawn_as_quads, point_size},
-    drivers::SKY,
-    support::{Case, Choose, Driver, Random, Shot, camera, each_driver, imai16, random_cloud, sphere},
+    support::{Case, Choose, Driver, Random, SKY, Shot, camera, each_driver, imai16, random_cloud, sphere},
 };
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{

@@ -2,8 +2,7 @@
 
 use crate::{
     background::{HostScene, Painted},
-    drivers::SKY,
-    support::{Case, Choose, Driver, Shot, camera, each_driver, imai16, random_cloud},
+    support::{Case, Choose, Driver, SKY, Shot, camera, each_driver, imai16, random_cloud},
 };
 use glam::{DVec3, Vec3};
 use meniscus::{

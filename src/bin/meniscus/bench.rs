@@ -201,17 +201,19 @@ fn all(
     Ok(runs)
 }
 
-const RADIUS: f32 = 0.01;
+/// Of particles that are made.
+pub const RADIUS: f32 = 0.01;
 
 /// SplitMix64 (Steele et al. 2014): the same numbers everywhere.
-fn unit(state: &mut u64) -> f32 {
+pub fn unit(state: &mut u64) -> f32 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
 }
 
-fn offset(state: &mut u64, reach: f32) -> Vec3 {
+/// A step of less than so much each way.
+pub fn offset(state: &mut u64, reach: f32) -> Vec3 {
     (2.0 * Vec3::new(unit(state), unit(state), unit(state)) - 1.0) * reach
 }
 

@@ -11,12 +11,14 @@ mod choices;
 mod codes;
 #[cfg(feature = "study")]
 mod compare;
+mod completions;
 mod compositing;
 mod dump;
 mod dump_field;
 mod empty;
 mod info;
 mod keys;
+mod man;
 mod options;
 mod outputs;
 mod part;
@@ -40,6 +42,7 @@ mod truth;
 mod tune;
 #[cfg(feature = "view")]
 mod view;
+mod workload;
 
 use clap::{Parser, Subcommand, error::ContextValue};
 use meniscus::host::{DeviceInfo, HostError, Instance};
@@ -87,6 +90,12 @@ enum Command {
     View(Box<view::Args>),
     /// Print what a driver's compiler makes of a method's shaders: registers, spills, occupancy; needs no GPU
     Pipelines(Box<pipelines::Args>),
+    /// Draw a fixed set of frames and print every draw and dispatch of them: for simulators, traces and modified drivers
+    Workload(workload::Args),
+    /// Print what a shell needs to complete command lines
+    Completions(completions::Args),
+    /// Write manual pages
+    Man(man::Args),
     /// List devices, drivers, features, limits and file formats; or what is in particle files.
     Info(info::Args),
 }
@@ -129,6 +138,9 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
         Command::View(args) => view::run(&args),
         Command::Pipelines(args) => pipelines::run(&args),
         Command::Submit(args) => submit::run(&args),
+        Command::Workload(args) => workload::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
         Command::Info(args) => info::run(&args),
     }
 }
