@@ -191,11 +191,16 @@ impl Host {
 
     /// Gives an object a debug name: "meniscus <role>".
     pub(crate) fn set_name<H: vk::Handle>(&self, handle: H, role: &str) {
-        if let Some(utils) = &self.debug_utils {
-            let name = std::ffi::CString::new(format!("meniscus {role}")).unwrap_or_default();
-            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
-            // SAFETY: the handle was just made from this device. A name that cannot be set is no error.
-            let _ = unsafe { utils.set_debug_utils_object_name(&info) };
-        }
+        set_name(self.debug_utils.as_ref(), handle, role);
+    }
+}
+
+/// Gives an object that was just made a debug name: "meniscus <role>".
+pub(crate) fn set_name<H: vk::Handle>(utils: Option<&ash::ext::debug_utils::Device>, handle: H, role: &str) {
+    if let Some(utils) = utils {
+        let name = std::ffi::CString::new(format!("meniscus {role}")).unwrap_or_default();
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+        // SAFETY: the handle was just made from this device. A name that cannot be set is no error.
+        let _ = unsafe { utils.set_debug_utils_object_name(&info) };
     }
 }

@@ -13,6 +13,7 @@ use crate::{
     scale::Scale,
     shader::Frame,
     space::Space,
+    statistics::PassStatistics,
 };
 pub use crate::{
     access::{Access, Barrier, State},
@@ -39,6 +40,8 @@ pub struct Inspection {
     /// Smoothing ends after so many times that depths go through a shader, if it does not end before: of a filter's maps only
     /// the last two are still there after a frame.
     pub smoothing_steps: Option<u32>,
+    /// What the device counts of each pass, for [`Renderer::statistics`]. The device was made with `pipelineStatisticsQuery`.
+    pub statistics: bool,
 }
 
 impl Inspection {
@@ -111,6 +114,12 @@ impl Renderer {
     /// Says what frames to come write beside the picture.
     pub fn inspect(&mut self, inspection: Inspection) {
         self.inspection = inspection;
+    }
+
+    /// What the device counted of the frame last recorded into a slot, which has completed: each pass in order. `None` unless
+    /// [`Inspection::statistics`] asked for it.
+    pub fn statistics(&self, slot: usize) -> Option<Vec<PassStatistics>> {
+        self.slots.get(slot)?.statistics.as_ref()?.read(&self.host.device)
     }
 
     /// Which targets hold the surfaces of the last frame.

@@ -92,6 +92,8 @@ mod space;
 pub mod space;
 #[cfg(any(feature = "io", feature = "inspect"))]
 mod srgb;
+#[cfg(feature = "inspect")]
+pub mod statistics;
 #[cfg(feature = "study")]
 pub mod study;
 mod table;

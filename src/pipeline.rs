@@ -245,6 +245,11 @@ impl Pipeline {
             Ok(pipelines) => {
                 self.handle = pipelines[0];
                 host.set_name(self.handle, name);
+                host.set_name(self.layout, name);
+                host.set_name(self.set_layout, name);
+                if self.sampler != vk::Sampler::null() {
+                    host.set_name(self.sampler, name);
+                }
                 Ok(())
             }
             Err((_, e)) => {

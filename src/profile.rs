@@ -40,9 +40,42 @@ pub(crate) struct Profiler {
     pool: vk::QueryPool,
     /// Scopes that there is room for.
     room: u32,
-    names: Vec<(&'static str, Home, &'static str)>,
+    names: Vec<Scope>,
+    clock: Clock,
+}
+
+/// Of a scope: its pass, what that works for, and as what part of the frame.
+type Scope = (&'static str, Home, &'static str);
+
+/// The device's: ticks of so many nanoseconds, of which so many bits count.
+struct Clock {
     period_ns: f64,
     mask: u64,
+}
+
+impl Clock {
+    /// Milliseconds from one tick to a later one. What is above the bits that count may be anything, and those begin anew when
+    /// they are used up.
+    fn ms(&self, from: u64, to: u64) -> f64 {
+        (to.wrapping_sub(from) & self.mask) as f64 * self.period_ns * 1e-6
+    }
+
+    /// Times of a frame, of a pair of ticks for each scope.
+    fn frame(&self, scopes: &[Scope], ticks: &[u64]) -> FrameTimes {
+        let (first, last) = (ticks[0], ticks[ticks.len() - 1]);
+        let pass = |((name, home, part), t): (&Scope, &[u64])| PassTime {
+            name: (*name).to_owned(),
+            begin_ms: self.ms(first, t[0]),
+            ms: self.ms(t[0], t[1]),
+            prepares: *home == Home::Particles,
+            part,
+        };
+        FrameTimes {
+            passes: scopes.iter().zip(ticks.chunks(2)).map(pass).collect(),
+            span_ms: self.ms(first, last),
+            begin_ns: (first & self.mask) as f64 * self.period_ns,
+        }
+    }
 }
 
 impl Profiler {
@@ -54,8 +87,7 @@ impl Profiler {
             pool: vk::QueryPool::null(),
             room: 0,
             names: Vec::new(),
-            period_ns,
-            mask: limits.timestamp_mask,
+            clock: Clock { period_ns, mask: limits.timestamp_mask },
         })
     }
 
@@ -68,6 +100,7 @@ impl Profiler {
         // SAFETY: complete info on a live device.
         let pool = unsafe { host.device.create_query_pool(&info, None) }.map_err(Error::vulkan("timestamps"))?;
         self.destroy(&host.device);
+        host.set_name(pool, "timestamps");
         (self.pool, self.room) = (pool, scopes);
         self.names.clear();
         Ok(())
@@ -108,25 +141,35 @@ impl Profiler {
         }
         // SAFETY: the queries were reset and written; without WAIT this returns NOT_READY until they are there.
         unsafe { device.get_query_pool_results(self.pool, 0, &mut ticks, vk::QueryResultFlags::TYPE_64) }.ok()?;
-        let ms = |from: u64, to: u64| (to.wrapping_sub(from) & self.mask) as f64 * self.period_ns * 1e-6;
-        let passes = self
-            .names
-            .iter()
-            .zip(ticks.chunks(2))
-            .map(|((name, home, part), t)| PassTime {
-                name: (*name).to_owned(),
-                begin_ms: ms(ticks[0], t[0]),
-                ms: ms(t[0], t[1]),
-                prepares: *home == Home::Particles,
-                part,
-            })
-            .collect();
-        let begin_ns = (ticks[0] & self.mask) as f64 * self.period_ns;
-        Some(FrameTimes { passes, span_ms: ms(ticks[0], ticks[ticks.len() - 1]), begin_ns })
+        Some(self.clock.frame(&self.names, &ticks))
     }
 
     pub fn destroy(&mut self, device: &ash::Device) {
         // SAFETY: called when no frame is in flight.
         unsafe { device.destroy_query_pool(self.pool, None) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Clock, Home};
+
+    /// Ticks of 36 bits, with anything above them, that begin anew within a pass, and others of 64.
+    #[test]
+    fn clocks_that_begin_anew_measure_the_same() {
+        let scopes = [("sort", Home::Particles, "particles"), ("walk", Home::View, "optics")];
+        let few = Clock { period_ns: 2.0, mask: (1 << 36) - 1 };
+        let at = |tick: u64, above: u64| (tick & few.mask) | above << 36;
+        let begin = (1 << 36) - 1_000_000;
+        let wrapped = few.frame(
+            &scopes,
+            &[at(begin, 3), at(begin + 1_500_000, 0), at(begin + 2_000_000, 9), at(begin + 4_000_000, 1)],
+        );
+        assert_eq!(wrapped.passes.iter().map(|p| (p.begin_ms, p.ms)).collect::<Vec<_>>(), [(0.0, 3.0), (4.0, 4.0)]);
+        assert_eq!((wrapped.span_ms, wrapped.begin_ns), (8.0, 2.0 * begin as f64));
+        let whole = Clock { period_ns: 2.0, mask: u64::MAX };
+        let ticks = [u64::MAX - 999_999, 500_000, 1_000_000, 3_000_000];
+        assert_eq!(whole.frame(&scopes, &ticks).passes, wrapped.passes);
+        assert_eq!(wrapped.passes.iter().map(|p| p.prepares).collect::<Vec<_>>(), [true, false]);
     }
 }

@@ -67,6 +67,8 @@ pub(crate) struct Recorder<'a> {
     pub externals: Externals,
     pub pool: vk::DescriptorPool,
     pub profiler: Option<&'a mut Profiler>,
+    #[cfg(feature = "inspect")]
+    pub statistics: Option<&'a mut crate::statistics::Statistics>,
     pub barriers: &'a mut Vec<PlanEntry>,
     /// What the device is given to do.
     pub work: &'a mut Vec<WorkEntry>,
@@ -90,7 +92,15 @@ impl Recorder<'_> {
             if let Some(p) = &mut self.profiler {
                 p.begin(&self.host.device, self.cmd, &pass[0]);
             }
+            #[cfg(feature = "inspect")]
+            if let Some(s) = &mut self.statistics {
+                s.begin(&self.host.device, self.cmd, name);
+            }
             let recorded = pass.iter().try_for_each(|step| self.step(step));
+            #[cfg(feature = "inspect")]
+            if let Some(s) = &self.statistics {
+                s.end(&self.host.device, self.cmd);
+            }
             if let Some(p) = &mut self.profiler {
                 p.end(&self.host.device, self.cmd);
             }

@@ -302,6 +302,8 @@ impl Renderer {
         // The slot's last frame has completed, and with it every frame before.
         self.retired.collect(&self.host, slot.frame);
         slot.fit(&self.host, &plan)?;
+        #[cfg(feature = "inspect")]
+        slot.count(&self.host, &plan, self.inspection.statistics)?;
         self.frame += 1;
         for (table, home) in self.tables.iter_mut().zip(HOMES) {
             table.fit(&self.host, &plan, home, &mut self.retired, self.frame)?;
@@ -350,6 +352,10 @@ impl Renderer {
         if let Some(p) = &mut slot.profiler {
             p.begin_frame(&self.host.device, cmd);
         }
+        #[cfg(feature = "inspect")]
+        if let Some(s) = &slot.statistics {
+            s.begin_frame(&self.host.device, cmd, plan.scopes());
+        }
         self.barriers.clear();
         self.work.clear();
         let recorder = Recorder {
@@ -361,6 +367,8 @@ impl Renderer {
             externals,
             pool: slot.pool,
             profiler: slot.profiler.as_mut(),
+            #[cfg(feature = "inspect")]
+            statistics: slot.statistics.as_mut(),
             barriers: &mut self.barriers,
             work: &mut self.work,
             frame_block: access::State::default(),
@@ -384,6 +392,10 @@ impl Renderer {
         if let Some(slot) = self.slots.get_mut(slot) {
             // That this slot is free again says nothing of frames before this one, which may still run.
             slot.frame = 0;
+            #[cfg(feature = "inspect")]
+            if let Some(s) = &mut slot.statistics {
+                s.abandon_frame();
+            }
             if let Some(p) = &mut slot.profiler {
                 p.abandon_frame();
             }

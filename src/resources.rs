@@ -147,6 +147,9 @@ impl Image {
         self.view = whole;
         self.layers = layers?;
         host.set_name(self.view, name);
+        for (i, layer) in self.layers.iter().enumerate() {
+            host.set_name(*layer, &format!("{name}, layer {i}"));
+        }
         Ok(())
     }
 
@@ -188,6 +191,7 @@ impl Buffer {
                 let view = vk::BufferViewCreateInfo::default().buffer(handle).format(format).range(vk::WHOLE_SIZE);
                 // SAFETY: the buffer is bound to memory; the format is one that every device has for this.
                 buffer.texels = unsafe { host.device.create_buffer_view(&view, None) }.map_err(Error::vulkan(name))?;
+                host.set_name(buffer.texels, name);
             }
             Ok(())
         });

@@ -7,6 +7,9 @@ use gpu_allocator::MemoryLocation;
 /// What belongs to one of the frames in flight.
 pub(crate) struct Slot {
     pub profiler: Option<Profiler>,
+    /// Of a frame that was asked for them.
+    #[cfg(feature = "inspect")]
+    pub statistics: Option<crate::statistics::Statistics>,
     pub pool: vk::DescriptorPool,
     /// Sets, and descriptors of each type, that the pool holds.
     room: (u32, Vec<(vk::DescriptorType, u32)>),
@@ -22,7 +25,27 @@ impl Slot {
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
         let frame_block = Buffer::new(host, "frame block", scale::BLOCKS, usage, MemoryLocation::CpuToGpu)?;
         let pool = vk::DescriptorPool::null();
-        Ok(Slot { profiler: Profiler::new(host), pool, room: (0, Vec::new()), frame_block, frame: 0 })
+        Ok(Slot {
+            profiler: Profiler::new(host),
+            #[cfg(feature = "inspect")]
+            statistics: None,
+            pool,
+            room: (0, Vec::new()),
+            frame_block,
+            frame: 0,
+        })
+    }
+
+    /// Counts what the plan's passes do, if `counting`; the slot's last frame has completed.
+    #[cfg(feature = "inspect")]
+    pub fn count(&mut self, host: &Host, plan: &Plan, counting: bool) -> Result<(), Error> {
+        if let Some(mut last) = self.statistics.take() {
+            last.destroy(&host.device);
+        }
+        if counting && plan.scopes() > 0 {
+            self.statistics = Some(crate::statistics::Statistics::new(host, plan.scopes())?);
+        }
+        Ok(())
     }
 
     /// Makes room for a plan's descriptor sets and timestamps; the slot's last frame has completed.
@@ -57,6 +80,7 @@ impl Slot {
             host.device.destroy_descriptor_pool(self.pool, None);
             self.pool = pool;
         }
+        host.set_name(self.pool, "descriptor sets");
         self.room = (sets, counts);
         Ok(())
     }
@@ -68,6 +92,10 @@ impl Slot {
         unsafe { host.device.destroy_descriptor_pool(self.pool, None) };
         if let Some(p) = &mut self.profiler {
             p.destroy(&host.device);
+        }
+        #[cfg(feature = "inspect")]
+        if let Some(s) = &mut self.statistics {
+            s.destroy(&host.device);
         }
     }
 }

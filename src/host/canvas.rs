@@ -78,6 +78,8 @@ impl<'a> Canvas<'a> {
                 .subresource_range(crate::access::whole(aspect));
             canvas.view = gpu.device.create_image_view(&info, None).map_err(vulkan("canvas"))?;
         }
+        gpu.set_name(canvas.image, "canvas");
+        gpu.set_name(canvas.view, "canvas");
         Ok(canvas)
     }
 

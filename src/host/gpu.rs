@@ -1,6 +1,10 @@
 //! A device with one queue.
 
-use super::{DeviceInfo, HostError, Instance, vulkan};
+use super::{
+    DeviceInfo, HostError, Instance,
+    tools::{Stages, Tools},
+    vulkan,
+};
 use crate::{compiler, device};
 use ash::vk;
 use gpu_allocator::{
@@ -10,6 +14,7 @@ use gpu_allocator::{
 use std::{
     ffi::c_char,
     sync::{Arc, Mutex},
+    time::Instant,
 };
 
 /// A device with one queue, on which commands run and are waited for.
@@ -23,12 +28,13 @@ pub struct Gpu<'a> {
     pool: vk::CommandPool,
     allocator: Option<Arc<Mutex<Allocator>>>,
     debug: Option<ash::ext::debug_utils::Device>,
+    pub(super) tools: Tools,
 }
 
 impl<'a> Gpu<'a> {
     /// Makes a device with exactly what meniscus needs.
     pub fn new(instance: &'a Instance, info: DeviceInfo) -> Result<Gpu<'a>, HostError> {
-        Gpu::with(instance, info, &[], vk::DeviceCreateInfo::default())
+        Gpu::with(instance, info, &[], vk::DeviceCreateInfo::default(), false)
     }
 
     /// A device that also tells what its compiler makes of pipelines: see [`crate::compiler`].
@@ -41,22 +47,34 @@ impl<'a> Gpu<'a> {
         }
         let mut tells =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
-        Gpu::with(instance, info, &[name.as_ptr()], vk::DeviceCreateInfo::default().push_next(&mut tells))
+        Gpu::with(instance, info, &[name.as_ptr()], vk::DeviceCreateInfo::default().push_next(&mut tells), false)
+    }
+
+    /// A device that counts what pipelines do: see [`crate::inspect::Inspection::statistics`].
+    pub fn counting(instance: &'a Instance, info: DeviceInfo) -> Result<Gpu<'a>, HostError> {
+        // SAFETY: the physical device is this instance's.
+        let features = unsafe { instance.handle.get_physical_device_features(info.handle) };
+        if features.pipeline_statistics_query == vk::FALSE {
+            return Err(HostError::NoStatistics(info.label()));
+        }
+        Gpu::with(instance, info, &[], vk::DeviceCreateInfo::default(), true)
     }
 
     /// A device that also presents to surfaces.
     pub fn presenting(instance: &'a Instance, info: DeviceInfo) -> Result<Gpu<'a>, HostError> {
-        Gpu::with(instance, info, &[ash::khr::swapchain::NAME.as_ptr()], vk::DeviceCreateInfo::default())
+        Gpu::with(instance, info, &[ash::khr::swapchain::NAME.as_ptr()], vk::DeviceCreateInfo::default(), false)
     }
 
-    fn with(
+    pub(super) fn with(
         instance: &'a Instance,
         info: DeviceInfo,
         extensions: &[*const c_char],
         create: vk::DeviceCreateInfo,
+        statistics: bool,
     ) -> Result<Gpu<'a>, HostError> {
         let mut features13 = device::required_features();
-        let features = vk::PhysicalDeviceFeatures::default().large_points(info.large_points);
+        let features =
+            vk::PhysicalDeviceFeatures::default().large_points(info.large_points).pipeline_statistics_query(statistics);
         let queue_info =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(info.family).queue_priorities(&[1.0])];
         let create = create
@@ -71,6 +89,7 @@ impl<'a> Gpu<'a> {
             pool: vk::CommandPool::null(),
             allocator: None,
             debug: instance.debug.as_ref().map(|_| ash::ext::debug_utils::Device::new(&instance.handle, &device)),
+            tools: Tools::default(),
             device,
             info,
             instance,
@@ -81,6 +100,7 @@ impl<'a> Gpu<'a> {
             let pool = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.info.family);
             gpu.pool = gpu.device.create_command_pool(&pool, None).map_err(vulkan("command pool"))?;
         }
+        gpu.set_name(gpu.pool, "commands");
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.handle.clone(),
             device: gpu.device.clone(),
@@ -118,8 +138,30 @@ impl<'a> Gpu<'a> {
         }
     }
 
+    /// Gives an object a debug name, as the renderer gives its own.
+    pub(super) fn set_name<H: vk::Handle>(&self, handle: H, role: &str) {
+        device::set_name(self.debug.as_ref(), handle, role);
+    }
+
     /// Records with `record`, submits and waits.
     pub fn run<T>(&self, record: impl FnOnce(vk::CommandBuffer) -> Result<T, HostError>) -> Result<T, HostError> {
+        Ok(self.submit(None, record)?.0)
+    }
+
+    /// The same of all that a frame submits, or the last of it: its end is marked where the device offers that, and
+    /// [`Gpu::stages`] says when what was done.
+    pub fn run_frame<T>(&self, record: impl FnOnce(vk::CommandBuffer) -> Result<T, HostError>) -> Result<T, HostError> {
+        let (value, stages) = self.submit(self.tools.end_of_frame(), record)?;
+        self.tools.note(stages);
+        Ok(value)
+    }
+
+    fn submit<T>(
+        &self,
+        boundary: Option<vk::FrameBoundaryEXT<'static>>,
+        record: impl FnOnce(vk::CommandBuffer) -> Result<T, HostError>,
+    ) -> Result<(T, Stages), HostError> {
+        let began = Instant::now();
         let info = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the pool is this device's and this object is not shared between threads (it is not Sync).
@@ -128,20 +170,27 @@ impl<'a> Gpu<'a> {
             // SAFETY: the buffer is new.
             unsafe { self.device.begin_command_buffer(cmd, &begin) }.map_err(vulkan("command buffer"))?;
             let value = record(cmd)?;
+            let recorded = Instant::now();
             let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
-            let submit = vk::SubmitInfo2::default().command_buffer_infos(&buffers);
+            let mut submit = vk::SubmitInfo2::default().command_buffer_infos(&buffers);
+            let mut boundary = boundary;
+            if let Some(boundary) = &mut boundary {
+                submit = submit.push_next(boundary);
+            }
+            let submitted;
             // SAFETY: recording has ended before submission; the fence is new, and waited for before it is destroyed.
             unsafe {
                 self.device.end_command_buffer(cmd).map_err(vulkan("command buffer"))?;
                 // Not kept: a device that runs nothing may have none.
                 let fence = self.device.create_fence(&Default::default(), None).map_err(vulkan("fence"))?;
-                let submitted = self.device.queue_submit2(self.queue, &[submit], fence).map_err(vulkan("submission"));
-                let done = submitted
-                    .and_then(|()| self.device.wait_for_fences(&[fence], true, u64::MAX).map_err(vulkan("frame")));
+                let given = self.device.queue_submit2(self.queue, &[submit], fence).map_err(vulkan("submission"));
+                submitted = Instant::now();
+                let done =
+                    given.and_then(|()| self.device.wait_for_fences(&[fence], true, u64::MAX).map_err(vulkan("frame")));
                 self.device.destroy_fence(fence, None);
                 done?;
             }
-            Ok(value)
+            Ok((value, Stages { begin: began, recorded, submitted, done: Instant::now() }))
         })();
         // SAFETY: it has completed, or was never submitted.
         unsafe { self.device.free_command_buffers(self.pool, &[cmd]) };
@@ -162,6 +211,7 @@ impl<'a> Gpu<'a> {
         let result = self.allocate("readback", requirements, MemoryLocation::GpuToCpu, true).and_then(|allocation| {
             // SAFETY: memory of the buffer's own requirements.
             let bound = unsafe { self.device.bind_buffer_memory(buffer, allocation.memory(), allocation.offset()) };
+            self.set_name(buffer, "readback");
             let run = bound.map_err(vulkan("readback buffer")).and_then(|()| {
                 self.run(|cmd| {
                     record(cmd, buffer)?;

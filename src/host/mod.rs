@@ -4,6 +4,7 @@
 mod canvas;
 mod gpu;
 mod session;
+mod tools;
 mod upload;
 mod validation;
 
@@ -13,6 +14,7 @@ pub use canvas::Canvas;
 pub use gpu::Gpu;
 pub use session::Session;
 use std::ffi::CStr;
+pub use tools::{Calibration, Stages};
 pub use upload::Upload;
 pub use validation::Messages;
 
@@ -53,6 +55,9 @@ pub enum HostError {
         "Vulkan here has no {0}, which a window needs: install libvulkan1 and a driver that presents (mesa-vulkan-drivers does)"
     )]
     NoExtension(String),
+    /// A device counts nothing.
+    #[error("{0} has no pipelineStatisticsQuery: choose another device (lavapipe counts)")]
+    NoStatistics(String),
     /// A Vulkan call failed.
     #[error("{0}: {1}{remedy}", remedy = remedy(*.1))]
     Vulkan(&'static str, vk::Result),

@@ -47,7 +47,7 @@ impl<'a> Session<'a> {
     pub fn frame(&mut self, input: &FrameInput) -> Result<Option<FrameTimes>, HostError> {
         let input = FrameInput { output: self.canvas.view, ..*input };
         let (renderer, canvas) = (&mut self.renderer, &self.canvas);
-        self.gpu.run(|cmd| {
+        self.gpu.run_frame(|cmd| {
             // A frame may keep what is there, which is then to be something.
             let (undefined, clearing) = (vk::ImageLayout::UNDEFINED, vk::ImageLayout::GENERAL);
             canvas.transition(cmd, undefined, clearing);

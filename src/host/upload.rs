@@ -33,6 +33,7 @@ impl<'a> Upload<'a> {
             upload.allocation = Some(allocation);
             bound.map_err(vulkan("upload"))?;
         }
+        gpu.set_name(buffer, "upload");
         Ok(upload)
     }
 }

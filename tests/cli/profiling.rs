@@ -1,6 +1,7 @@
 //! Figures for profilers: traces of frames, and what changed between two measurements.
 
-use crate::{Run, block, text};
+use crate::{Run, block, text, workload::devices};
+use meniscus::host::{Gpu, Instance};
 use serde_json::{Value, json};
 use std::{collections::BTreeSet, fs};
 
@@ -58,6 +59,76 @@ fn a_trace_nests_passes_in_parts_in_frames() {
     }
     run.refused(1, &["bench", &cloud, "--trace", "trace.txt"], &["trace.txt", ".json"]);
     run.refused(1, &["bench", &cloud, "--trace", "a.json", "-o", "a.json"], &["a.json", "--trace"]);
+}
+
+/// On every driver that tells the time: each frame of the device's lies between its submission and the end of waiting for it.
+#[test]
+fn the_hosts_work_and_the_devices_are_on_one_axis() {
+    let run = Run::new();
+    let cloud = run.file("cloud.csv", block(0.0));
+    let mut told = 0;
+    for device in devices() {
+        let instance = Instance::new(false).expect("an instance");
+        let gpu = Gpu::profiled(&instance, instance.pick(Some(&device)).expect("it is there")).expect("a device");
+        let tells = gpu.calibrate().expect("the time").is_some();
+        println!("{device}: tells the time: {tells}; marks frames: {}", gpu.marks_frames());
+        let output = run.command(&[&["bench", &cloud, "--device", &device, "--trace", "t.json"], &SMALL[..]].concat());
+        assert!(output.status.success(), "{device}: {}", text(&output));
+        let trace = read(&run, "t.json");
+        let zones = trace["traceEvents"].as_array().expect("events").iter().filter(|e| e["ph"] == "X");
+        let (host, own): (Vec<&Value>, Vec<_>) = zones.partition(|z| z["cat"] == "host");
+        let number = |z: &Value, key: &str| z[key].as_f64().expect("a number");
+        let end = |z: &Value| number(z, "ts") + number(z, "dur");
+        assert_eq!(host.len(), if tells { 9 } else { 0 }, "{device}: record, submit, wait of three frames");
+        let frames = own.iter().filter(|z| z["cat"] == "frame");
+        for (stages, frame) in host.chunks(3).zip(frames) {
+            let [record, submit, wait] = stages else { panic!("{stages:?}") };
+            assert_eq!([record, submit, wait].map(|z| z["name"].as_str()), ["record", "submit", "wait"].map(Some));
+            assert!(number(record, "ts") >= 0.0 && end(record) <= number(submit, "ts") + 1e-3, "{stages:?}");
+            // The two clocks are compared to a few microseconds, unless somebody else had the processor just then.
+            let (early, late) = (number(submit, "ts") - number(frame, "ts"), end(frame) - end(wait));
+            assert!(early < 1000.0 && late < 1000.0, "{device}: {frame} is not between {submit} and {wait}");
+            told += 1;
+        }
+        assert!(host.iter().all(|z| z["tid"] != own[0]["tid"]), "{device}");
+    }
+    assert!(told > 0 || !devices().iter().any(|d| d.contains("Mesa 25")), "Mesa 25 tells the time");
+}
+
+/// What a device counts is of the pass that it is printed for; one that counts nothing says so.
+#[test]
+fn passes_are_counted_by_the_device() {
+    let run = Run::new();
+    let cloud = run.file("cloud.csv", block(0.0));
+    let mut counted = 0;
+    for device in devices() {
+        let args = ["bench", &cloud, "--statistics", "--size", "64x48", "--method", "imai16", "--device", &device];
+        let output = run.command(&args);
+        let said = text(&output);
+        if !output.status.success() {
+            assert!(output.status.code() == Some(1) && said.contains("pipelineStatisticsQuery"), "{device}: {said}");
+            continue;
+        }
+        let counts = |pass: &str| -> Vec<u64> {
+            let row = said.lines().find_map(|l| l.strip_prefix(&format!("{pass:<24}")));
+            let row = row.unwrap_or_else(|| panic!("{device}: no {pass} in {said}"));
+            row.split_whitespace().map(|n| n.parse().expect("a number")).collect()
+        };
+        let [vertices, vertex, before, after, fragments, compute] = counts("walk")[..] else { panic!("{said}") };
+        // Each tile of the picture is a point, or two triangles, of tiles with liquid or of those without.
+        assert!(vertices > 0 && (before == vertices || before == vertices / 3), "{device}: {said}");
+        assert!(vertex > 0 && after <= before && after > 0, "{device}: {said}");
+        assert!((64 * 48..2 * 64 * 48 + 8 * vertices).contains(&fragments) && compute == 0, "{device}: {fragments}");
+        for pass in ["extent", "sort", "shape", "cull"] {
+            let [.., fragments, compute] = counts(pass)[..] else { panic!("{said}") };
+            // 217 particles, an invocation each or for four of them.
+            assert!(fragments == 0 && compute >= 217 / 4, "{device}: {pass}: {compute}");
+        }
+        assert!(!said.contains("median"), "{device}: times of what was counted");
+        counted += 1;
+    }
+    assert!(counted > 0, "no driver counts: lavapipe does");
+    run.refused(2, &["bench", &cloud, "--statistics", "-o", "a.json"], &["--statistics", "--output"]);
 }
 
 /// A change within the noise is none; one beyond it is named, as is whatever was measured with something else.
@@ -120,7 +191,7 @@ fn fields_of_figures_are_documented() {
     let args = [&["bench", &cloud, "--scaling", "--max-particles", "10000", "-o"], &["b.json"][..], &SMALL].concat();
     assert!(run.command(&args).status.success());
     let mut found = BTreeSet::new();
-    names(&read(&run, "b.json"), &["parts", "settings", "units", "asked"], &mut found);
+    names(&read(&run, "b.json"), &["parts", "settings", "units", "asked", "variables"], &mut found);
     let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/figures.md")).expect("docs/figures.md");
     let table = text.split("## JSON").nth(1).and_then(|t| t.split("## ").next()).expect("a section");
     let rows = table.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());

@@ -5,7 +5,7 @@ use meniscus::host::Instance;
 use serde_json::Value;
 use std::{fs, path::Path, process::Command};
 
-fn devices() -> Vec<String> {
+pub fn devices() -> Vec<String> {
     let devices = Instance::new(false).and_then(|i| i.devices()).expect("a Vulkan loader");
     let usable: Vec<_> = devices.iter().filter(|d| d.refusal.is_none()).map(|d| d.label()).collect();
     assert!(!usable.is_empty(), "no usable Vulkan device: run ./setup.sh");
@@ -127,6 +127,38 @@ fn a_workload_is_what_a_capture_holds() {
                 _ => {}
             }
         }
+    }
+    // Whatever is made has a name, but for what lives no longer than a submission or a pipeline's making.
+    let handles = |name: &str, key: &str| -> Vec<Value> {
+        calls(&capture, name)
+            .iter()
+            .flat_map(|args| match &args[key] {
+                Value::Array(all) => all.clone(),
+                one => vec![one.clone()],
+            })
+            .collect()
+    };
+    let named: Vec<_> = calls(&capture, "vkSetDebugUtilsObjectNameEXT")
+        .iter()
+        .map(|args| args["pNameInfo"]["objectHandle"].clone())
+        .collect();
+    for (name, key, least) in [
+        ("vkCreateCommandPool", "pCommandPool", 1),
+        ("vkCreateBuffer", "pBuffer", 10),
+        ("vkCreateBufferView", "pView", 0),
+        ("vkCreateImage", "pImage", 5),
+        ("vkCreateImageView", "pView", 10),
+        ("vkCreateSampler", "pSampler", 0),
+        ("vkCreateDescriptorSetLayout", "pSetLayout", 10),
+        ("vkCreatePipelineLayout", "pPipelineLayout", 10),
+        ("vkCreateComputePipelines", "pPipelines", 5),
+        ("vkCreateGraphicsPipelines", "pPipelines", 3),
+        ("vkCreateDescriptorPool", "pDescriptorPool", 1),
+        ("vkCreateQueryPool", "pQueryPool", 1),
+    ] {
+        let made = handles(name, key);
+        let nameless = made.iter().filter(|handle| !named.contains(handle)).count();
+        assert!(made.len() >= least && nameless == 0, "{name}: {} made, {nameless} without a name", made.len());
     }
     // One device with one queue and nothing that is not required.
     let [device] = calls(&capture, "vkCreateDevice")[..] else { panic!("devices") };

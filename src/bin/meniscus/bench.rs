@@ -1,6 +1,7 @@
 //! `meniscus bench`: what each pass takes, in figures that can be repeated.
 
 mod compare;
+mod statistics;
 mod trace;
 
 use crate::{
@@ -15,7 +16,7 @@ use crate::{
 use glam::Vec3;
 use meniscus::{
     LedgerEntry, Settings,
-    host::{Gpu, Instance, Session},
+    host::{Gpu, Instance, Session, Stages},
     profile::{FrameTimes, PassTime},
 };
 use std::{path::PathBuf, process::ExitCode};
@@ -53,6 +54,9 @@ pub struct Args {
     /// Where to write a trace of the frames that are measured, for ui.perfetto.dev or Chrome's about:tracing
     #[arg(long, value_name = "FILE.json")]
     pub trace: Option<PathBuf>,
+    /// Measures no time: draws one frame of each scene with each method, and prints what the device counted of each pass
+    #[arg(long, conflicts_with_all = ["output", "trace", "still"])]
+    pub statistics: bool,
     /// Measures nothing: says what changed from one file of figures to another, beyond the noise of both
     #[arg(long, num_args = 2, value_names = ["BEFORE.json", "NOW.json"], exclusive = true)]
     pub compare: Vec<PathBuf>,
@@ -100,7 +104,16 @@ pub struct Run {
     pub preparation: Vec<f64>,
     /// And as they were measured.
     pub frames: Vec<FrameTimes>,
+    /// The same frames on the host's clock, where the device's is known there.
+    pub on_host: Vec<OnHost>,
     pub memory: Vec<LedgerEntry>,
+}
+
+/// A frame on the host's clock.
+pub struct OnHost {
+    pub stages: Stages,
+    /// From the begin of its recording to its first timestamp.
+    pub device_ms: f64,
 }
 
 impl Run {
@@ -142,7 +155,8 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     let environment = picture.environment()?;
     args.show(&report::measured_on(&device))?;
     let on_device = on(&device);
-    let gpu = Gpu::new(&instance, device).map_err(|e| on_device(e.into()))?;
+    let made = if args.statistics { Gpu::counting(&instance, device) } else { Gpu::profiled(&instance, device) };
+    let gpu = made.map_err(|e| on_device(e.into()))?;
     let mut session = Session::new(&gpu, size, &environment).map_err(|e| on_device(e.into()))?;
     let runs = all(args, &pictures, &mut session);
     session.end();
@@ -175,9 +189,10 @@ fn all(
     let mut add = |name: String, scene: Scene| -> Result<(), Box<dyn std::error::Error>> {
         let begin = runs.len();
         for (method, picture) in pictures {
-            let run = measure(args, session, (&name, method), picture, &scene)?;
-            report::print(&run, args, picture)?;
-            runs.push(run);
+            if let Some(run) = measure(args, session, (&name, method), picture, &scene)? {
+                report::print(&run, args, picture)?;
+                runs.push(run);
+            }
         }
         Ok(report::compare(&runs[begin..], args)?)
     };
@@ -256,18 +271,26 @@ fn measure(
     (name, method): (&str, &str),
     picture: &Picture,
     scene: &Scene,
-) -> Result<Run, Box<dyn std::error::Error>> {
+) -> Result<Option<Run>, Box<dyn std::error::Error>> {
     let particles = &scene.particles;
     let (camera, eye, _) = picture.camera(scene)?;
     let settings = picture.frame_settings(particles)?;
     let upload = scene.give(picture.preparer(), &settings, session)?;
     let input = scene.input(&camera, &settings, eye, upload.as_ref()).still(args.still);
+    if args.statistics {
+        statistics::print(&format!("{name}, {method}"), session, &input)?;
+        return Ok(None);
+    }
     let bar = progress(u64::from(args.warmup + args.frames), "frames");
-    let mut frames: Vec<FrameTimes> = Vec::new();
+    let (mut frames, mut on_host): (Vec<FrameTimes>, Vec<OnHost>) = Default::default();
     for i in 0..args.warmup + args.frames {
         let times = session.frame(&input)?.ok_or("this device has no timestamps: nothing can be measured")?;
         bar.inc(1);
         if i >= args.warmup {
+            // After the frame, where it disturbs nothing that is measured.
+            if let (Some(stages), Some(now)) = (session.gpu.stages(), session.gpu.calibrate()?) {
+                on_host.push(OnHost { stages, device_ms: now.since(stages.begin, times.begin_ns) });
+            }
             frames.push(times);
         }
     }
@@ -278,7 +301,7 @@ fn measure(
     let total = |f: &FrameTimes, preparing: bool| {
         f.passes.iter().filter(|p| p.prepares || !preparing).map(|p| p.ms).sum::<f64>()
     };
-    Ok(Run {
+    Ok(Some(Run {
         scene: name.to_owned(),
         method: method.to_owned(),
         particles: scene.positions.len(),
@@ -292,5 +315,6 @@ fn measure(
         preparation: frames.iter().map(|f| total(f, true)).collect(),
         memory: session.renderer.memory(),
         frames,
-    })
+        on_host,
+    }))
 }

@@ -224,6 +224,24 @@ fn table(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> R
     Ok(csv.into_inner()?)
 }
 
+/// What else times may hang on: the machine, and variables that drivers, their loader and its layers read.
+fn environment() -> Value {
+    let processor = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
+        let line = text.lines().find(|l| l.starts_with("model name"))?;
+        Some(line.split_once(':')?.1.trim().to_owned())
+    });
+    let read = ["VK_", "MESA_", "GALLIUM_", "LP_", "RADV_", "ACO_", "ANV_", "INTEL_", "NVK_"];
+    let text = |s: std::ffi::OsString| s.to_string_lossy().into_owned();
+    let all = std::env::vars_os().map(|(name, value)| (text(name), json!(text(value))));
+    json!({
+        "system": std::env::consts::OS,
+        "architecture": std::env::consts::ARCH,
+        "processor": processor,
+        "threads": std::thread::available_parallelism().ok().map(std::num::NonZero::get),
+        "variables": all.filter(|(name, _)| read.iter().any(|r| name.starts_with(r))).collect::<Map<_, _>>(),
+    })
+}
+
 /// JSON: everything.
 fn tree(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> Result<Vec<u8>, Box<dyn Error>> {
     let on_device = picture.preparer().on_device();
@@ -254,6 +272,7 @@ fn tree(args: &Args, picture: &Picture, device: &DeviceInfo, runs: &[Run]) -> Re
         "commit": COMMIT,
         "command": options::command(),
         "device": {"name": device.name, "driver": device.driver, "kind": device.kind, "vulkan": device.api},
+        "environment": environment(),
         "protocol": {
             "times": "GPU timestamps around each pass; passes of one name summed; every frame waited for",
             "frames": args.frames,

@@ -11,6 +11,9 @@ struct Figures {
     commit: String,
     device: Map<String, Value>,
     protocol: Map<String, Value>,
+    /// Older figures have none.
+    #[serde(default)]
+    environment: Map<String, Value>,
     runs: Vec<Run>,
 }
 
@@ -63,6 +66,7 @@ pub fn run(before: &Path, now: &Path) -> Result<(), Box<dyn Error>> {
     line(format!("before: {} (commit {}); now: {} (commit {})", before.display(), a.commit, now.display(), b.commit))?;
     said("device", &a.device, &b.device)?;
     said("protocol", &a.protocol, &b.protocol)?;
+    said("environment", &a.environment, &b.environment)?;
     let mut pairs = 0;
     for run in &b.runs {
         let same = |old: &&Run| (&old.scene, &old.method) == (&run.scene, &run.method);

@@ -1,9 +1,11 @@
 //! Frames as a trace that Perfetto (ui.perfetto.dev) and Chrome's `about:tracing` show: the Trace Event Format, one process for
-//! each scene and method, and in it frames, their parts and their passes, one in the other.
+//! each scene and method, and in it frames, their parts and their passes, one in the other; where the device's clock is known on
+//! the host's, also what the host did, beside them.
 
-use super::Run;
+use super::{OnHost, Run};
 use meniscus::profile::{FrameTimes, PassTime};
 use serde_json::{Value, json};
+use std::time::Instant;
 
 /// Between frames whose clock does not say how far they are apart, in milliseconds.
 const GAP: f64 = 1.0;
@@ -13,9 +15,16 @@ pub fn of(runs: &[Run], device: &str) -> Result<Vec<u8>, serde_json::Error> {
     let mut events = Vec::new();
     for (process, run) in runs.iter().enumerate() {
         let name = format!("{}, {}", run.scene, run.method);
-        events.push(json!({"ph": "M", "name": "process_name", "pid": process, "tid": 0, "args": {"name": name}}));
-        events.push(json!({"ph": "M", "name": "thread_name", "pid": process, "tid": 0, "args": {"name": device}}));
-        let mut zones: Vec<_> = starts(&run.frames).into_iter().zip(&run.frames).flat_map(zones).collect();
+        events.push(json!({"ph": "M", "name": "process_name", "pid": process, "tid": DEVICE, "args": {"name": name}}));
+        events.push(json!({"ph": "M", "name": "thread_name", "pid": process, "tid": DEVICE, "args": {"name": device}}));
+        let known = run.on_host.len() == run.frames.len();
+        let starts = if known { starts_on_host(&run.on_host) } else { starts(&run.frames) };
+        let mut zones: Vec<_> = starts.into_iter().zip(&run.frames).flat_map(zones).collect();
+        if known {
+            let args = json!({"name": "host"});
+            events.push(json!({"ph": "M", "name": "thread_name", "pid": process, "tid": HOST, "args": args}));
+            zones.extend(host_zones(&run.on_host));
+        }
         zones.sort_by(|a, b| a.begin.total_cmp(&b.begin).then(b.ms.total_cmp(&a.ms)));
         events.extend(zones.iter().map(|zone| zone.event(process)));
     }
@@ -36,9 +45,42 @@ fn starts(frames: &[FrameTimes]) -> Vec<f64> {
     all
 }
 
+const DEVICE: u32 = 0;
+const HOST: u32 = 1;
+
+fn ms(from: Instant, to: Instant) -> f64 {
+    1e3 * to.duration_since(from).as_secs_f64()
+}
+
+/// When frames begin on the device, in milliseconds after the host began to record the first.
+fn starts_on_host(frames: &[OnHost]) -> Vec<f64> {
+    frames.iter().map(|f| ms(frames[0].stages.begin, f.stages.begin) + f.device_ms).collect()
+}
+
+/// What the host did for each frame.
+fn host_zones(frames: &[OnHost]) -> Vec<Zone> {
+    let zones = |f: &OnHost| {
+        let s = f.stages;
+        let zone = |name: &str, from, to| Zone {
+            name: name.into(),
+            kind: "host",
+            thread: HOST,
+            begin: ms(frames[0].stages.begin, from),
+            ms: ms(from, to),
+        };
+        [
+            zone("record", s.begin, s.recorded),
+            zone("submit", s.recorded, s.submitted),
+            zone("wait", s.submitted, s.done),
+        ]
+    };
+    frames.iter().flat_map(zones).collect()
+}
+
 struct Zone {
     name: String,
     kind: &'static str,
+    thread: u32,
     begin: f64,
     ms: f64,
 }
@@ -46,21 +88,22 @@ struct Zone {
 impl Zone {
     fn event(&self, process: usize) -> Value {
         let (ts, dur) = (1e3 * self.begin, 1e3 * self.ms);
-        json!({"ph": "X", "name": self.name, "cat": self.kind, "pid": process, "tid": 0, "ts": ts, "dur": dur})
+        json!({"ph": "X", "name": self.name, "cat": self.kind, "pid": process, "tid": self.thread, "ts": ts, "dur": dur})
     }
 }
 
 /// Of one frame: itself, runs of passes of one part, and passes.
 fn zones((start, frame): (f64, &FrameTimes)) -> Vec<Zone> {
-    let mut all = vec![Zone { name: "frame".into(), kind: "frame", begin: start, ms: frame.span_ms }];
+    let mut all = vec![Zone { name: "frame".into(), kind: "frame", thread: DEVICE, begin: start, ms: frame.span_ms }];
     let end = |p: &PassTime| p.begin_ms + p.ms;
     for passes in frame.passes.chunk_by(|a, b| a.part == b.part) {
         let (begin, part) = (passes[0].begin_ms, passes[0].part);
         let last = passes.iter().map(end).fold(begin, f64::max);
-        all.push(Zone { name: part.into(), kind: "part", begin: start + begin, ms: last - begin });
+        all.push(Zone { name: part.into(), kind: "part", thread: DEVICE, begin: start + begin, ms: last - begin });
         all.extend(passes.iter().map(|p| Zone {
             name: p.name.clone(),
             kind: "pass",
+            thread: DEVICE,
             begin: start + p.begin_ms,
             ms: p.ms,
         }));
