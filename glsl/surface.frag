@@ -7,6 +7,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
 #include "frame.glsl"
+#include "output.glsl"
 layout(set = 0, binding = 1) uniform texture2D first_surface; // first_surface.frag
 #ifdef NORMAL
 layout(constant_id = 0) const bool HALVED = false; // of a format without signs
@@ -36,7 +37,7 @@ layout(location = 0) out vec4 out_said;
 float host_depth(float d) { return clamp(frame.scene_z_offset / d - frame.scene_z_scale, 0.0, 1.0); }
 
 void main() {
-    vec4 surface = texelFetch(first_surface, ivec2(gl_FragCoord.xy), 0);
+    vec4 surface = texelFetch(first_surface, ivec2(view_position()), 0);
     // The block is read in any case: every pass has it.
     if (surface.w <= 0.0 || frame.size.x <= 0.0) discard;
 #if defined(DEPTH)
@@ -45,8 +46,8 @@ void main() {
     out_said = vec4(host_depth(surface.w));
 #elif defined(MOTION)
     vec3 moved = vec3(0.0);
-    if (MOVES) moved = texelFetch(surface_motion, ivec2(gl_FragCoord.xy), 0).xyz;
-    out_said = vec4(motion_vector(view_ray(gl_FragCoord.xy), surface.w, moved), 0.0, 0.0);
+    if (MOVES) moved = texelFetch(surface_motion, ivec2(view_position()), 0).xyz;
+    out_said = vec4(motion_vector(view_ray(view_position()), surface.w, moved), 0.0, 0.0);
 #elif defined(REACTIVE)
     out_said = vec4(push.reactive);
 #else

@@ -10,7 +10,7 @@ use crate::{
 };
 use ash::vk;
 pub use motion::{Before, DeviceVectors, Motion, MovingParticles};
-pub(crate) use surface::{Says, has_depth, is_halved};
+pub(crate) use surface::{COLOR_LAYOUTS, Says, has_depth, is_halved};
 pub use surface::{SurfaceOutput, SurfaceOutputs};
 
 /// What a frame shows where no liquid is, and what rays bring back that meet neither liquid nor scene.
@@ -51,7 +51,8 @@ pub enum EnvironmentShape {
     Cube,
 }
 
-/// The host's opaque scene, rendered before the liquid at the same size and with the same camera. It hides liquid, is seen
+/// The host's opaque scene, rendered before the liquid at the same size and with the same camera, of one sample a pixel: what was
+/// multisampled is resolved before, its depth by one of its samples (a mean of depths is nobody's). It hides liquid, is seen
 /// through it, and ends rays under water. Liquid whose wall lies up to three and a half radii (across that wall) before an
 /// opaque surface touches it: simulated particles stop short of floors.
 #[derive(Clone, Copy, Debug)]
@@ -65,6 +66,8 @@ pub struct SceneInput {
     pub depth: vk::ImageView,
     /// Layout the depth is in, before and after.
     pub depth_layout: vk::ImageLayout,
+    /// Where the view begins in both, in pixels: they may be larger than it.
+    pub origin: [u32; 2],
     /// Depth value where nothing was drawn, 0 to 1: 1 with depths that grow away from the eye ([`Camera::look_at`]), 0 with
     /// reversed ones. Compared for equality: what is infinitely far away is seen there (see [`Background`]).
     pub cleared_depth: f32,
@@ -84,7 +87,13 @@ impl SceneInput {
         (depth, depth_layout): (vk::ImageView, vk::ImageLayout),
         cleared_depth: f32,
     ) -> SceneInput {
-        SceneInput { color, color_layout, depth, depth_layout, cleared_depth }
+        SceneInput { color, color_layout, depth, depth_layout, origin: [0, 0], cleared_depth }
+    }
+
+    /// The same in a part of larger images (an atlas, say), whose upper left corner is this pixel.
+    #[must_use]
+    pub fn origin(self, origin: [u32; 2]) -> Self {
+        SceneInput { origin, ..self }
     }
 }
 
@@ -114,37 +123,43 @@ pub struct FrameInput<'a> {
     /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it. A density field
     /// ([`crate::layers::field`]) knows by itself.
     pub eye_inside: bool,
-    /// Output, of the format given to [`crate::Renderer::new`] and the size given to [`crate::Renderer::resize`], in
-    /// `COLOR_ATTACHMENT_OPTIMAL` before and after.
+    /// Output, of one sample, of the format given to [`crate::Renderer::new`] and at least of the size given to
+    /// [`crate::Renderer::resize`].
     pub output: vk::ImageView,
+    /// Layout the output is in, before and after: one in which it can be attached. Usually `COLOR_ATTACHMENT_OPTIMAL`.
+    pub output_layout: vk::ImageLayout,
+    /// Where the view begins in the output and in the images of [`FrameInput::surface`], in pixels: they may be larger than it. What
+    /// is beside it stays as it is.
+    pub origin: [u32; 2],
     /// What later passes are told of the first surface: its depth, its normal, its motion, where it is.
     pub surface: SurfaceOutputs,
 }
 
-/// Layouts in which a shader may sample an image.
-fn can_be_sampled(layout: vk::ImageLayout) -> bool {
-    use vk::ImageLayout as L;
-    [
-        L::GENERAL,
-        L::SHADER_READ_ONLY_OPTIMAL,
-        L::READ_ONLY_OPTIMAL,
-        L::DEPTH_READ_ONLY_OPTIMAL,
-        L::DEPTH_STENCIL_READ_ONLY_OPTIMAL,
-        L::DEPTH_READ_ONLY_STENCIL_ATTACHMENT_OPTIMAL,
-    ]
-    .contains(&layout)
-}
+/// Layouts in which a shader may sample a colour.
+const SAMPLED: &[vk::ImageLayout] =
+    &[vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL, vk::ImageLayout::READ_ONLY_OPTIMAL, vk::ImageLayout::GENERAL];
+/// And a depth, of whatever format.
+const SAMPLED_DEPTH: &[vk::ImageLayout] = &[
+    vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+    vk::ImageLayout::READ_ONLY_OPTIMAL,
+    vk::ImageLayout::GENERAL,
+    vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL,
+    vk::ImageLayout::DEPTH_STENCIL_READ_ONLY_OPTIMAL,
+    vk::ImageLayout::DEPTH_READ_ONLY_STENCIL_ATTACHMENT_OPTIMAL,
+];
 
-fn check_sampled(what: &'static str, view: vk::ImageView, layout: vk::ImageLayout) -> Result<(), Error> {
+fn check_sampled(
+    what: &'static str,
+    view: vk::ImageView,
+    layout: vk::ImageLayout,
+    legal: &[vk::ImageLayout],
+) -> Result<(), Error> {
     if view == vk::ImageView::null() {
         return Err(Error::parameter(what, "null", "give an image view, or None for the whole"));
     }
-    if !can_be_sampled(layout) {
-        return Err(Error::parameter(
-            what,
-            format!("in {layout:?}"),
-            "bring it into a layout in which it can be sampled",
-        ));
+    if !legal.contains(&layout) {
+        let remedy = format!("bring it into a layout in which it can be sampled: {legal:?}");
+        return Err(Error::parameter(what, format!("in {layout:?}"), remedy));
     }
     Ok(())
 }
@@ -155,12 +170,16 @@ impl<'a> FrameInput<'a> {
         if self.output == vk::ImageView::null() {
             return Err(Error::parameter("output", "null", "give the view that is to be drawn into"));
         }
+        if !COLOR_LAYOUTS.contains(&self.output_layout) {
+            let remedy = format!("bring it into one in which it can be attached: {COLOR_LAYOUTS:?}");
+            return Err(Error::parameter("layout of the output", format!("{:?}", self.output_layout), remedy));
+        }
         if let Some(e) = &self.environment {
-            check_sampled("environment", e.view, e.layout)?;
+            check_sampled("environment", e.view, e.layout, SAMPLED)?;
         }
         if let Some(s) = &self.scene {
-            check_sampled("scene colour", s.color, s.color_layout)?;
-            check_sampled("scene depth", s.depth, s.depth_layout)?;
+            check_sampled("scene colour", s.color, s.color_layout, SAMPLED)?;
+            check_sampled("scene depth", s.depth, s.depth_layout, SAMPLED_DEPTH)?;
             if !(0.0..=1.0).contains(&s.cleared_depth) {
                 return Err(Error::parameter(
                     "cleared depth",
@@ -191,6 +210,8 @@ impl<'a> FrameInput<'a> {
             environment: None,
             eye_inside: false,
             output,
+            output_layout: vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            origin: [0, 0],
             surface: SurfaceOutputs::default(),
         }
     }
@@ -235,6 +256,18 @@ impl<'a> FrameInput<'a> {
     #[must_use]
     pub fn output(self, output: vk::ImageView) -> Self {
         FrameInput { output, ..self }
+    }
+
+    /// The same with an output in another layout, before and after.
+    #[must_use]
+    pub fn output_layout(self, output_layout: vk::ImageLayout) -> Self {
+        FrameInput { output_layout, ..self }
+    }
+
+    /// The same in a part of larger images (an atlas, say), whose upper left corner is this pixel.
+    #[must_use]
+    pub fn origin(self, origin: [u32; 2]) -> Self {
+        FrameInput { origin, ..self }
     }
 
     /// The same with images that say something of the first surface.

@@ -18,7 +18,8 @@
 //! * Several views of one picture's size are as many calls of [`Renderer::record`], each with a slot of its own: make
 //!   `frames_in_flight` the views times the frames. A view of another size wants a renderer of its own, because targets are
 //!   made anew whenever the size changes.
-//! * The output image is in `COLOR_ATTACHMENT_OPTIMAL` before and after; it is written as a colour attachment.
+//! * The output image is in `COLOR_ATTACHMENT_OPTIMAL` before and after, or in [`FrameInput::output_layout`]; it is written as a
+//!   colour attachment, and may be larger than the view ([`FrameInput::origin`]).
 //!   The host makes it available before (for reading too, where [`Background::Host`] keeps what it holds), and makes it
 //!   visible afterwards.
 //! * [`Background`] says what is seen without liquid. With [`Background::Environment`], the default, every pixel is

@@ -32,7 +32,10 @@ pub(crate) struct Externals {
     /// The host's, or the renderer's own.
     pub environment: (vk::ImageView, vk::ImageLayout),
     pub scene: Option<SceneInput>,
-    pub output: vk::ImageView,
+    /// With the layout it is in.
+    pub output: (vk::ImageView, vk::ImageLayout),
+    /// Where the view begins in what the host gives to be drawn into.
+    pub origin: [u32; 2],
     pub surface: SurfaceOutputs,
     /// Particles that move, and how: as positions.
     pub moving: [(vk::Buffer, u64, u64); 2],
@@ -297,7 +300,12 @@ impl Recorder<'_> {
         }
         let [width, height] =
             rendering.colors.first().map_or(self.plan.picture, |c| self.plan.attachment_size(c.target));
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
+        // Nothing of the frame's own is attached beside the host's, unless both begin at once.
+        let mut attached = rendering.colors.iter().map(|c| c.target).chain(rendering.depth.iter().map(|d| d.target));
+        let given = attached.any(|target| matches!(self.plan.resource(target).made, Made::Given(_)));
+        let [x, y] = if given { self.externals.origin } else { [0, 0] };
+        let offset = vk::Offset2D { x: x as i32, y: y as i32 };
+        let area = vk::Rect2D { offset, extent: vk::Extent2D { width, height } };
         let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&colors);
         let depth_info;
         if let Some(depth) = &rendering.depth {
@@ -310,8 +318,14 @@ impl Recorder<'_> {
             depth_info = attachment(view, layout, load, vk::ClearValue { depth_stencil: value }).store_op(store);
             info = info.depth_attachment(&depth_info);
         }
-        let viewport =
-            vk::Viewport { x: 0.0, y: 0.0, width: width as f32, height: height as f32, min_depth: 0.0, max_depth: 1.0 };
+        let viewport = vk::Viewport {
+            x: x as f32,
+            y: y as f32,
+            width: width as f32,
+            height: height as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
         // SAFETY: the attachments are alive, in the stated layouts (declared by the pass), and of this size.
         unsafe {
             self.host.device.cmd_begin_rendering(self.cmd, &info);
@@ -386,7 +400,7 @@ impl Recorder<'_> {
     ) -> Result<(vk::ImageView, vk::ImageLayout), Error> {
         let absent = || absent("recording", self.plan.resource(target).name);
         match self.plan.resource(target).made {
-            Made::Given(External::Output(_)) => Ok((self.externals.output, own)),
+            Made::Given(External::Output(_)) => Ok(self.externals.output),
             Made::Given(External::Surface(says, _)) => {
                 self.externals.surface.of(says).map(|o| (o.view, o.layout)).ok_or_else(absent)
             }

@@ -23,7 +23,7 @@ use crate::{
 pub use ahead::Amount;
 use ahead::check_memory;
 use ash::vk;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use uploads::Footprints;
 
 /// Renders particle liquids into a host's command buffers. See the crate's documentation for the contract.
@@ -210,6 +210,25 @@ impl Renderer {
         Ok(())
     }
 
+    /// Refuses a view that cannot lie where it is said to begin.
+    fn check_origins(&self, input: &FrameInput, walks: bool) -> Result<(), Error> {
+        let origins = [("origin", Some(input.origin)), ("origin of the scene", input.scene.map(|s| s.origin))];
+        for (what, origin) in origins {
+            let origin = origin.unwrap_or_default();
+            let beyond = |k: usize| origin[k].checked_add(self.size[k]).is_none_or(|end| end > self.limits.image_size);
+            if (0..2).any(beyond) {
+                let remedy =
+                    format!("the view has to end at {} pixels, where images of this device do", self.limits.image_size);
+                return Err(Error::parameter(what, format!("{origin:?}"), remedy));
+            }
+        }
+        if walks && input.origin != [0, 0] {
+            // What is written beside the picture then begins where it does.
+            return Err(Error::parameter("origin", format!("{:?}", input.origin), "inspected walks begin at [0, 0]"));
+        }
+        Ok(())
+    }
+
     /// Keeps something that recorded commands may still use until the next frame has completed: uploads and copies
     /// that were recorded since the last frame run before that one.
     fn retire(&mut self, resource: Resource) {
@@ -228,7 +247,8 @@ impl Renderer {
     /// * The buffers of [`crate::MovingParticles`] are alive until the frame has completed, have usage `STORAGE_BUFFER`, and their earlier
     ///   writes are visible to reads in vertex shaders.
     /// * The output, and what there is of the scene, of an environment of the host's and of [`FrameInput::surface`], are alive until
-    ///   the frame has completed and in the stated layouts; all but the environment are of this size. Their earlier writes are
+    ///   the frame has completed and in the stated layouts; all but the environment have the view in
+    ///   them, whole, where it is said to begin. Their earlier writes are
     ///   visible to sampling in fragment shaders, and those of the output and of the surface's images to the attachment stages.
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, input: &FrameInput) -> Result<(), Error> {
         input.settings.validate()?;
@@ -288,6 +308,7 @@ impl Renderer {
         let mut plan = frame::plan(&scene)?;
         self.check_bindings(&plan, scene.count, input.positions.as_ref())?;
         input.check_handles()?;
+        self.check_origins(input, scene.walks)?;
         check_memory(&self.host, &self.limits, &self.tables, &plan)?;
         self.pipelines.make(&self.host, plan.recipes())?;
 
@@ -327,7 +348,9 @@ impl Renderer {
             block.scene_z_scale = p.z_axis.z;
             block.scene_z_offset = p.w_axis.z / space.radius as f32;
         }
+        block.output_origin = Vec2::from(input.origin.map(|o| o as f32));
         if let Some(scene) = &input.scene {
+            block.scene_origin = Vec2::from(scene.origin.map(|o| o as f32));
             block.scene_cleared = scene.cleared_depth;
         }
         let particles = self.particles.as_ref();
@@ -340,7 +363,8 @@ impl Renderer {
             points: self.points.as_ref().map_or(vk::Buffer::null(), |b| b.handle),
             environment,
             scene: input.scene,
-            output: input.output,
+            output: (input.output, input.output_layout),
+            origin: input.origin,
             surface: input.surface,
             moving: input.surface.motion.map(|m| m.bound()).unwrap_or_default(),
         };

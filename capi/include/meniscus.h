@@ -10,7 +10,8 @@
  *
  * - Frames are submitted to one queue in the order they were recorded. Before the host records into a slot again, the frame last
  *   recorded into it has completed. A frame that was recorded and never runs is said to be so with meniscus_renderer_abandon.
- * - The output image is in COLOR_ATTACHMENT_OPTIMAL before and after. The host makes it available before, and visible afterwards.
+ * - The output image is in COLOR_ATTACHMENT_OPTIMAL before and after, or in MeniscusFrame::output_layout. The host makes it available
+ *   before, and visible afterwards.
  * - Structs begin with their size: set struct_size to sizeof the struct, and all that is not needed to 0, which stands for what is
  *   usual. Programs run with later libraries as they are, and with earlier ones unless they ask for what those do not know.
  * - Objects are made with ..._create, ..._copy or meniscus_prepare, and destroyed with ..._destroy; null is destroyed as nothing.
@@ -308,7 +309,8 @@ typedef struct {
 } MeniscusPositions;
 
 /**
- * The host's opaque scene, rendered before the liquid at the same size and with the same camera. It hides liquid, is seen through
+ * The host's opaque scene, rendered before the liquid at the same size and with the same camera, of one sample a pixel: what was
+ * multisampled is resolved before, its depth by one of its samples. It hides liquid, is seen through
  * it, and ends rays under water. Both images are sampled in the fragment stage.
  */
 typedef struct {
@@ -340,6 +342,10 @@ typedef struct {
      * 0.
      */
     uint32_t reserved;
+    /**
+     * Where the view begins in both, in pixels: they may be larger than it.
+     */
+    uint32_t origin[2];
 } MeniscusScene;
 
 /**
@@ -364,6 +370,74 @@ typedef struct {
      */
     uint32_t shape;
 } MeniscusEnvironment;
+
+/**
+ * Motion vectors of the first surface: where each pixel's surface was in the frame before, less where it is, in parts of the
+ * picture's width and height, y down, both without jitter (FSR and DLSS: scale them by the size in pixels). It moves with the
+ * camera, and as the particle nearest to it does.
+ */
+typedef struct {
+    /**
+     * sizeof(MeniscusMotion).
+     */
+    size_t struct_size;
+    /**
+     * Where they go: R16G16_SFLOAT, R32G32_SFLOAT, or with two more components, which become 0.
+     */
+    VkImageView output;
+    /**
+     * Format of the output's view.
+     */
+    VkFormat output_format;
+    /**
+     * Layout the output is in, before and after: one in which it can be attached.
+     */
+    VkImageLayout output_layout;
+    /**
+     * World to eye of the frame before, column by column.
+     */
+    float previous_view[16];
+    /**
+     * The frame before's projection, without its jitter.
+     */
+    float previous_projection[16];
+    /**
+     * This frame's projection, without its jitter.
+     */
+    float projection[16];
+    /**
+     * Particles that move: three 32-bit floats each, in world units. Read in vertex shaders, as `before`.
+     */
+    VkBuffer positions;
+    /**
+     * Where the first one begins, in bytes; a multiple of 4.
+     */
+    VkDeviceSize position_offset;
+    /**
+     * Bytes from one to the next; a multiple of 4, at least 12. 0 stands for 12.
+     */
+    VkDeviceSize position_stride;
+    /**
+     * Their velocities, in world units a second; or where they were in the frame before, if `seconds` is 0.
+     */
+    VkBuffer before;
+    /**
+     * Where the first one begins, in bytes; a multiple of 4.
+     */
+    VkDeviceSize before_offset;
+    /**
+     * Bytes from one to the next; a multiple of 4, at least 12. 0 stands for 12.
+     */
+    VkDeviceSize before_stride;
+    /**
+     * How many particles; 0: the liquid stands still, and only the camera moves.
+     */
+    uint32_t count;
+    /**
+     * Seconds since the frame before, that velocities count for; 0 where `before` holds positions.
+     */
+    float seconds;
+} MeniscusMotion;
 
 /**
  * What a frame says of the first surface that each pixel shows, the one that the picture has, into images of the host's: loaded,
@@ -403,6 +477,31 @@ typedef struct {
      * Layout the normal is in, before and after: one in which it can be attached.
      */
     VkImageLayout normal_layout;
+    /**
+     * How it has moved since the frame before; or null.
+     */
+    const MeniscusMotion *motion;
+    /**
+     * A mask that says how little of the pixel's history a temporal upscaler may keep (FSR: reactive, DLSS: bias of the current
+     * colour); or null. R8_UNORM, R16_SFLOAT or R32_SFLOAT.
+     */
+    VkImageView reactive;
+    /**
+     * Format of the mask's view.
+     */
+    VkFormat reactive_format;
+    /**
+     * Layout the mask is in, before and after: one in which it can be attached.
+     */
+    VkImageLayout reactive_layout;
+    /**
+     * What the mask says where liquid shows, 0 to 1; FSR advises 0.9 at most.
+     */
+    float reactive_value;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
 } MeniscusSurface;
 
 /**
@@ -422,7 +521,7 @@ typedef struct {
      */
     const MeniscusSettings *settings;
     /**
-     * Of the format and size that the renderer was given, in COLOR_ATTACHMENT_OPTIMAL before and after.
+     * Of one sample, of the format that the renderer was given, and at least of its size.
      */
     VkImageView output;
     /**
@@ -458,6 +557,19 @@ typedef struct {
      * What later passes are told of the first surface; or null.
      */
     const MeniscusSurface *surface;
+    /**
+     * Where the view begins in the output and in the images of `surface`, in pixels: they may be larger than it. What is beside it
+     * stays as it is.
+     */
+    uint32_t origin[2];
+    /**
+     * Layout the output is in, before and after: COLOR_ATTACHMENT_OPTIMAL, ATTACHMENT_OPTIMAL or GENERAL. 0 stands for the first.
+     */
+    VkImageLayout output_layout;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
 } MeniscusFrame;
 
 /**

@@ -7,12 +7,13 @@ use crate::{
     versioned::{Versioned, borrow, read, read_some},
 };
 use renderer::{
-    Background, Camera, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput, Settings, SurfaceOutput,
-    SurfaceOutputs,
+    Background, Before, Camera, DeviceVectors, EnvironmentInput, EnvironmentShape, FrameInput, Motion, MovingParticles,
+    SceneInput, Settings, SurfaceOutput, SurfaceOutputs,
     ash::vk::{
         Bool32 as VkBool32, Buffer as VkBuffer, DeviceSize as VkDeviceSize, Format as VkFormat,
         ImageLayout as VkImageLayout, ImageView as VkImageView,
     },
+    glam::Mat4,
     prepare::{DeviceIds, DevicePositions, Options},
 };
 use std::mem::offset_of;
@@ -81,7 +82,8 @@ impl MeniscusPositions {
     }
 }
 
-/// The host's opaque scene, rendered before the liquid at the same size and with the same camera. It hides liquid, is seen through
+/// The host's opaque scene, rendered before the liquid at the same size and with the same camera, of one sample a pixel: what was
+/// multisampled is resolved before, its depth by one of its samples. It hides liquid, is seen through
 /// it, and ends rays under water. Both images are sampled in the fragment stage.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -100,6 +102,8 @@ pub struct MeniscusScene {
     pub cleared_depth: f32,
     /// 0.
     pub reserved: u32,
+    /// Where the view begins in both, in pixels: they may be larger than it.
+    pub origin: [u32; 2],
 }
 
 // SAFETY: repr(C); its size first; no padding (a test adds it up); numbers and handles.
@@ -133,6 +137,70 @@ unsafe impl Versioned for MeniscusEnvironment {
     const LEAST: usize = offset_of!(MeniscusEnvironment, shape);
 }
 
+/// Motion vectors of the first surface: where each pixel's surface was in the frame before, less where it is, in parts of the
+/// picture's width and height, y down, both without jitter (FSR and DLSS: scale them by the size in pixels). It moves with the
+/// camera, and as the particle nearest to it does.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct MeniscusMotion {
+    /// sizeof(MeniscusMotion).
+    pub struct_size: usize,
+    /// Where they go: R16G16_SFLOAT, R32G32_SFLOAT, or with two more components, which become 0.
+    pub output: VkImageView,
+    /// Format of the output's view.
+    pub output_format: VkFormat,
+    /// Layout the output is in, before and after: one in which it can be attached.
+    pub output_layout: VkImageLayout,
+    /// World to eye of the frame before, column by column.
+    pub previous_view: [f32; 16],
+    /// The frame before's projection, without its jitter.
+    pub previous_projection: [f32; 16],
+    /// This frame's projection, without its jitter.
+    pub projection: [f32; 16],
+    /// Particles that move: three 32-bit floats each, in world units. Read in vertex shaders, as `before`.
+    pub positions: VkBuffer,
+    /// Where the first one begins, in bytes; a multiple of 4.
+    pub position_offset: VkDeviceSize,
+    /// Bytes from one to the next; a multiple of 4, at least 12. 0 stands for 12.
+    pub position_stride: VkDeviceSize,
+    /// Their velocities, in world units a second; or where they were in the frame before, if `seconds` is 0.
+    pub before: VkBuffer,
+    /// Where the first one begins, in bytes; a multiple of 4.
+    pub before_offset: VkDeviceSize,
+    /// Bytes from one to the next; a multiple of 4, at least 12. 0 stands for 12.
+    pub before_stride: VkDeviceSize,
+    /// How many particles; 0: the liquid stands still, and only the camera moves.
+    pub count: u32,
+    /// Seconds since the frame before, that velocities count for; 0 where `before` holds positions.
+    pub seconds: f32,
+}
+
+// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers and handles.
+unsafe impl Versioned for MeniscusMotion {
+    const NAME: &'static str = "MeniscusMotion";
+    const LEAST: usize = offset_of!(MeniscusMotion, positions);
+}
+
+impl MeniscusMotion {
+    /// What the renderer takes.
+    fn get(&self) -> Motion {
+        let vectors = |buffer, offset, stride| {
+            DeviceVectors::packed(buffer).laid_out(offset, if stride == 0 { 12 } else { stride })
+        };
+        let before = vectors(self.before, self.before_offset, self.before_stride);
+        let before = match self.seconds == 0.0 {
+            true => Before::Positions(before),
+            false => Before::Velocities(before, self.seconds),
+        };
+        let positions = vectors(self.positions, self.position_offset, self.position_stride);
+        let matrix = |m: &[f32; 16]| Mat4::from_cols_array(m);
+        let output = SurfaceOutput::new(self.output, self.output_format, self.output_layout);
+        let previous = (matrix(&self.previous_view), matrix(&self.previous_projection));
+        Motion::new(output, previous, matrix(&self.projection))
+            .particles((self.count > 0).then(|| MovingParticles::new(self.count, positions, before)))
+    }
+}
+
 /// What a frame says of the first surface that each pixel shows, the one that the picture has, into images of the host's: loaded,
 /// written where liquid shows, stored. Where none shows they keep what they hold. They are of one sample and of the output's size. An
 /// eye in the liquid sees it from the near plane on, which is then the surface, facing the eye.
@@ -157,24 +225,46 @@ pub struct MeniscusSurface {
     pub normal_format: VkFormat,
     /// Layout the normal is in, before and after: one in which it can be attached.
     pub normal_layout: VkImageLayout,
+    /// How it has moved since the frame before; or null.
+    pub motion: *const MeniscusMotion,
+    /// A mask that says how little of the pixel's history a temporal upscaler may keep (FSR: reactive, DLSS: bias of the current
+    /// colour); or null. R8_UNORM, R16_SFLOAT or R32_SFLOAT.
+    pub reactive: VkImageView,
+    /// Format of the mask's view.
+    pub reactive_format: VkFormat,
+    /// Layout the mask is in, before and after: one in which it can be attached.
+    pub reactive_layout: VkImageLayout,
+    /// What the mask says where liquid shows, 0 to 1; FSR advises 0.9 at most.
+    pub reactive_value: f32,
+    /// 0.
+    pub reserved: u32,
 }
 
-// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers and handles.
+// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers, handles and a pointer that may be null.
 unsafe impl Versioned for MeniscusSurface {
     const NAME: &'static str = "MeniscusSurface";
-    const LEAST: usize = size_of::<MeniscusSurface>();
+    const LEAST: usize = offset_of!(MeniscusSurface, motion);
+
+    fn reserved(&self) -> u32 {
+        self.reserved
+    }
 }
 
 impl MeniscusSurface {
     /// What the renderer takes.
-    fn get(&self) -> SurfaceOutputs {
+    ///
+    /// # Safety
+    /// As [`read_some`], for the motion.
+    unsafe fn get(&self) -> Result<SurfaceOutputs, Failure> {
+        // SAFETY: this function's contract.
+        let motion = unsafe { read_some(self.motion) }?.map(|m: MeniscusMotion| m.get());
         let output =
             |view, format, layout| (view != VkImageView::null()).then(|| SurfaceOutput::new(view, format, layout));
-        SurfaceOutputs::default().depth(output(self.depth, self.depth_format, self.depth_layout)).normal(output(
-            self.normal,
-            self.normal_format,
-            self.normal_layout,
-        ))
+        Ok(SurfaceOutputs::default()
+            .depth(output(self.depth, self.depth_format, self.depth_layout))
+            .normal(output(self.normal, self.normal_format, self.normal_layout))
+            .motion(motion)
+            .reactive(output(self.reactive, self.reactive_format, self.reactive_layout), self.reactive_value))
     }
 }
 
@@ -188,7 +278,7 @@ pub struct MeniscusFrame {
     pub camera: *const MeniscusCamera,
     /// Method, liquid, drawing; and how positions on the device are prepared.
     pub settings: *const MeniscusSettings,
-    /// Of the format and size that the renderer was given, in COLOR_ATTACHMENT_OPTIMAL before and after.
+    /// Of one sample, of the format that the renderer was given, and at least of its size.
     pub output: VkImageView,
     /// Which of the frames in flight this is: below MeniscusHost::frames_in_flight.
     pub slot: u32,
@@ -207,12 +297,23 @@ pub struct MeniscusFrame {
     pub eye_inside: VkBool32,
     /// What later passes are told of the first surface; or null.
     pub surface: *const MeniscusSurface,
+    /// Where the view begins in the output and in the images of `surface`, in pixels: they may be larger than it. What is beside it
+    /// stays as it is.
+    pub origin: [u32; 2],
+    /// Layout the output is in, before and after: COLOR_ATTACHMENT_OPTIMAL, ATTACHMENT_OPTIMAL or GENERAL. 0 stands for the first.
+    pub output_layout: VkImageLayout,
+    /// 0.
+    pub reserved: u32,
 }
 
 // SAFETY: repr(C); its size first; no padding (a test adds it up); numbers, handles and pointers that may be null.
 unsafe impl Versioned for MeniscusFrame {
     const NAME: &'static str = "MeniscusFrame";
     const LEAST: usize = offset_of!(MeniscusFrame, background);
+
+    fn reserved(&self) -> u32 {
+        self.reserved
+    }
 }
 
 /// A frame as it was read.
@@ -225,6 +326,8 @@ pub(crate) struct Read {
     environment: Option<EnvironmentInput>,
     background: Background,
     output: VkImageView,
+    output_layout: VkImageLayout,
+    origin: [u32; 2],
     still: bool,
     eye_inside: bool,
     surface: SurfaceOutputs,
@@ -240,7 +343,9 @@ impl Read {
             let settings = borrow(f.settings, "MeniscusFrame::settings")?;
             let camera = MeniscusCamera::get(f.camera)?;
             let (scene, environment) = (read_some(f.scene)?, read_some(f.environment)?);
-            (f, camera, settings, read_some(f.positions)?, scene, environment, read_some(f.surface)?)
+            let surface: Option<MeniscusSurface> = read_some(f.surface)?;
+            let surface = surface.map(|s| s.get()).transpose()?.unwrap_or_default();
+            (f, camera, settings, read_some(f.positions)?, scene, environment, surface)
         };
         let background = match f.background {
             MENISCUS_BACKGROUND_ENVIRONMENT => Background::Environment,
@@ -264,14 +369,19 @@ impl Read {
             settings: settings.settings,
             positions: positions.map(|p: MeniscusPositions| p.get(&settings.options)),
             scene: scene.map(|s: MeniscusScene| {
-                SceneInput::new((s.color, s.color_layout), (s.depth, s.depth_layout), s.cleared_depth)
+                SceneInput::new((s.color, s.color_layout), (s.depth, s.depth_layout), s.cleared_depth).origin(s.origin)
             }),
             environment,
             background,
             output: f.output,
+            output_layout: match f.output_layout {
+                VkImageLayout::UNDEFINED => VkImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+                layout => layout,
+            },
+            origin: f.origin,
             still: f.still != 0,
             eye_inside: f.eye_inside != 0,
-            surface: surface.map(|s: MeniscusSurface| s.get()).unwrap_or_default(),
+            surface,
         })
     }
 
@@ -285,6 +395,8 @@ impl Read {
             .still(self.still)
             .eye_inside(self.eye_inside)
             .surface(self.surface)
+            .origin(self.origin)
+            .output_layout(self.output_layout)
     }
 }
 

@@ -3,7 +3,7 @@
 #ifdef SCENE
 layout(set = 0, binding = 8) uniform texture2D scene_color; // the host's opaque scene, linear
 
-vec3 scene_light(ivec2 pixel) { return texelFetch(scene_color, pixel, 0).rgb; }
+vec3 scene_light(ivec2 pixel) { return texelFetch(scene_color, pixel + ivec2(frame.scene_origin), 0).rgb; }
 
 // Light from where a ray ends that meets neither liquid nor scene.
 vec3 infinitely_far(vec3 dir) {

@@ -5,7 +5,7 @@ layout(set = 0, binding = 9) uniform texture2D scene_depth; // the host's depth 
 const float CLEARED = 1e30; // linear depth where the host drew nothing
 
 float scene_linear(ivec2 p) {
-    float z = texelFetch(scene_depth, p, 0).x;
+    float z = texelFetch(scene_depth, p + ivec2(frame.scene_origin), 0).x;
     return z == frame.scene_cleared ? CLEARED : frame.scene_z_offset / (z + frame.scene_z_scale);
 }
 

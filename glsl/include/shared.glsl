@@ -204,6 +204,8 @@ struct Frame {
     vec2 environment_per_radian;
     float environment_columns;
     float environment_scale; // and the light of a step of the largest exponent
+    vec2 output_origin; // where the view begins in what the host draws into, in pixels
+    vec2 scene_origin;  // and in its scene
 };
 
 // Indirect draws of one class and side, two VkDrawIndirectCommand: one of points and one of quads.

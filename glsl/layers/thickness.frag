@@ -23,7 +23,7 @@ void main() {
     float root = sqrt(discriminant);
     float front = max(center.z + (-root - b) / a, frame.near), back = center.z + (root - b) / a;
 #ifdef SCENE
-    float z = texelFetch(scene_depth, ivec2(gl_FragCoord.xy), 0).x;
+    float z = texelFetch(scene_depth, ivec2(gl_FragCoord.xy + frame.scene_origin), 0).x;
     if (z != frame.scene_cleared) back = min(back, frame.scene_z_offset / (z + frame.scene_z_scale));
 #endif
     if (back <= front) discard;

@@ -6,6 +6,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
 #include "frame.glsl"
+#include "output.glsl"
 #include "optics.glsl"
 #include "field.glsl"
 layout(constant_id = 0) const uint REFRACTIONS = 4;
@@ -205,8 +206,8 @@ bool go_on(inout Walk w, inout Block block, out Wall wall) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec3 v = view_ray(gl_FragCoord.xy), eye_dir = normalize(v);
+    ivec2 pixel = ivec2(view_position());
+    vec3 v = view_ray(view_position()), eye_dir = normalize(v);
     Walk w = Walk(to_field(frame.near * v), transpose(mat3(frame.view)) * eye_dir, vec3(0.0), vec3(1.0), 0.0, 0.0, 0.0, AIR, vec3(0.0), -1,
                   OUTCOME_HIT, 0u, 0u, pixel);
     Block block = NOWHERE;

@@ -6,6 +6,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
 #include "frame.glsl"
+#include "output.glsl"
 #include "normal.glsl"
 #include "optics.glsl"
 layout(constant_id = 0) const uint MODE = 0; // one of LOOKUP_…
@@ -51,7 +52,7 @@ vec3 seen_at(vec2 p) {
 }
 
 // Moved by parts of the picture's edges, y up.
-vec3 seen_beside(vec2 offset) { return seen_at(gl_FragCoord.xy + offset * sign(frame.pixel_scale) * frame.size); }
+vec3 seen_beside(vec2 offset) { return seen_at(view_position() + offset * sign(frame.pixel_scale) * frame.size); }
 
 vec3 refracted(vec3 dir, vec3 n, float t_weight) {
     if (MODE == LOOKUP_NORMAL) return seen_beside(push.strength * t_weight * n.xy);
@@ -65,7 +66,7 @@ vec3 refracted(vec3 dir, vec3 n, float t_weight) {
 Front front_at(ivec2 pixel) {
     Front front;
     if (HALF_RESOLUTION) {
-        front = upsampled(gl_FragCoord.xy);
+        front = upsampled(view_position());
         // Over the host's picture a pixel is the liquid's or not.
         if (HOST_BACKGROUND && front.coverage < 0.5) front.depth = 0.0;
         return front;
@@ -110,8 +111,8 @@ vec3 shaded(vec3 color, vec3 dir, vec3 n, Front front) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec3 v = view_ray(gl_FragCoord.xy), dir = normalize(v);
+    ivec2 pixel = ivec2(view_position());
+    vec3 v = view_ray(view_position()), dir = normalize(v);
     Front front = front_at(pixel);
     float depth = front.depth;
     bool inside = depth < 0.0; // a particle around the near plane: nothing to bend at
@@ -125,7 +126,7 @@ void main() {
     if (dot(dir, n) > 0.0) n = -n;
     float length_inside = thickness_at(pixel);
     float t_weight = 1.0 - exp(-push.thickness_scale * length_inside);
-    vec3 color = inside ? seen_at(gl_FragCoord.xy) : refracted(dir, n, t_weight);
+    vec3 color = inside ? seen_at(view_position()) : refracted(dir, n, t_weight);
     color *= exp(-frame.absorption * length_inside);
     if (!inside) color = shaded(color, dir, n, front);
     // The liquid's edge runs between the maps' pixels.

@@ -5,6 +5,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
 #include "frame.glsl"
+#include "output.glsl"
 #include "optics.glsl"
 layout(constant_id = 0) const bool ENCODE_SRGB = false;
 const bool HOST_BACKGROUND = false; // the host's picture is not drawn over
@@ -17,7 +18,7 @@ layout(location = 2) out vec4 out_direction;
 #include "scene.glsl"
 
 void main() {
-    vec3 dir = normalize(view_ray(gl_FragCoord.xy)), color = behind(ivec2(gl_FragCoord.xy), dir);
+    vec3 dir = normalize(view_ray(view_position())), color = behind(ivec2(view_position()), dir);
     out_color = vec4(ENCODE_SRGB ? encode_srgb(color) : color, 1.0);
 #ifdef DEBUG
     out_walk = vec4(float(PATTERN_NONE), float(OUTCOME_NO_LIQUID), 0.0, 0.0);

@@ -12,6 +12,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shared.glsl"
 #include "frame.glsl"
+#include "output.glsl"
 #include "normal.glsl"
 #include "optics.glsl"
 layout(constant_id = 0) const uint REFRACTIONS = 4;
@@ -181,8 +182,8 @@ bool go_on(inout Walk w, out Wall wall) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec3 v = view_ray(gl_FragCoord.xy), dir = normalize(v);
+    ivec2 pixel = ivec2(view_position());
+    vec3 v = view_ray(view_position()), dir = normalize(v);
     int first;
     bool inside;
     float depth = first_surface(pixel, first, inside);

@@ -9,7 +9,7 @@ use ash::vk;
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct SurfaceOutput {
-    /// Its view, of one sample and of the output's size; of a format with stencil of both aspects or of depth alone.
+    /// Its view, of one sample; as large as the output, and the view begins in it where it does in that; of a format with stencil of both aspects or of depth alone.
     pub view: vk::ImageView,
     /// Format of the view.
     pub format: vk::Format,
@@ -184,7 +184,7 @@ const VECTORS: &[vk::Format] = &[
 const MASKS: &[vk::Format] = &[vk::Format::R8_UNORM, vk::Format::R16_SFLOAT, vk::Format::R32_SFLOAT];
 
 /// Layouts in which an image can be a colour attachment.
-const COLOR_LAYOUTS: &[vk::ImageLayout] =
+pub(crate) const COLOR_LAYOUTS: &[vk::ImageLayout] =
     &[vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::ATTACHMENT_OPTIMAL, vk::ImageLayout::GENERAL];
 /// Layouts in which its depth can be attached and written.
 const DEPTH_LAYOUTS: &[vk::ImageLayout] = &[

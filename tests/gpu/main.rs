@@ -2,6 +2,7 @@
 
 mod access;
 mod analytic;
+mod atlas;
 mod auto;
 mod background;
 mod behind;

@@ -241,7 +241,7 @@ fn each_format_of_depth_in_each_layout() {
     });
 }
 
-fn has(gpu: &Gpu, format: Format) -> bool {
+pub fn has(gpu: &Gpu, format: Format) -> bool {
     let host = gpu.host(1);
     // SAFETY: the device's own instance and physical device.
     let found = unsafe { host.instance.get_physical_device_format_properties(host.physical_device, format) };
@@ -315,7 +315,7 @@ fn each_format_of_normals_in_each_layout() {
 }
 
 /// A float of 16 bits, none of them an infinity.
-fn f16(bits: u16) -> f64 {
+pub fn f16(bits: u16) -> f64 {
     let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
     let size = if exponent == 0 { fraction * 2f64.powi(-14) } else { (1.0 + fraction) * 2f64.powi(exponent - 15) };
     if bits >> 15 == 1 { -size } else { size }

@@ -133,10 +133,11 @@ fn layouts_stay() {
         (64, ends!(MeniscusHost, debug_utils: u32)),
         (160, ends!(MeniscusCamera, reserved: u32)),
         (72, ends!(MeniscusPositions, id_stride: u64)),
-        (40, ends!(MeniscusScene, reserved: u32)),
+        (48, ends!(MeniscusScene, origin: [u32; 2])),
         (24, ends!(MeniscusEnvironment, shape: u32)),
-        (40, ends!(MeniscusSurface, normal_layout: u32)),
-        (80, ends!(MeniscusFrame, surface: usize)),
+        (72, ends!(MeniscusSurface, reserved: u32)),
+        (272, ends!(MeniscusMotion, seconds: f32)),
+        (96, ends!(MeniscusFrame, reserved: u32)),
         (64, ends!(MeniscusParticles, reserved: u32)),
         (64, ends!(MeniscusReport, splash_axes_ignored: usize)),
         (48, ends!(MeniscusEllipsoid, axes: [f32; 9])),
@@ -151,5 +152,6 @@ fn layouts_stay() {
     assert_eq!((offset_of!(MeniscusHost, queue_family), offset_of!(MeniscusHost, pipeline_cache)), (40, 48));
     assert_eq!((offset_of!(MeniscusPositions, keep_class_below), offset_of!(MeniscusPositions, id_buffer)), (40, 48));
     assert_eq!((offset_of!(MeniscusScene, cleared_depth), offset_of!(MeniscusFrame, positions)), (32, 40));
+    assert_eq!((offset_of!(MeniscusMotion, positions), offset_of!(MeniscusMotion, count)), (216, 264));
     assert_eq!((offset_of!(MeniscusParticles, velocities), offset_of!(MeniscusPassTime, ms)), (32, 96));
 }
