@@ -124,6 +124,8 @@ pub(crate) struct Scene<'a> {
     pub smoothing_steps: Option<u32>,
     /// Whether the device has points larger than a pixel.
     pub points: bool,
+    /// Largest edge of an image.
+    pub image_size: u32,
     /// Largest storage buffer in bytes, and texel buffer.
     pub storage_size: u64,
     pub texels_size: u64,
@@ -187,6 +189,7 @@ impl<'a> Scene<'a> {
             surface_read: false,
             smoothing_steps: None,
             points: limits.point_size > 1.0,
+            image_size: limits.image_size,
             storage_size: limits.storage_size,
             texels_size: limits.texels_size,
         }

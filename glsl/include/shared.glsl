@@ -276,6 +276,8 @@ struct Prepare {
 #define FIELD_SURE 0.9
 // The most that one particle adds to a node: below it whatever density the host says.
 #define FIELD_MOST_SHARE 32767.0
+// What the box of a dense grid's bricks is without any.
+#define DENSE_GRID_EMPTY 2147483647
 // Slots of the directory that are looked at for one block, at most.
 #define FIELD_PROBES 128
 // Words of a slot of the directory, which has one more than its slots, without anything: a block's key, 0 where the slot is free; the number of

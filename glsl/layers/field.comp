@@ -1,9 +1,10 @@
 // The density field as bricks of nodes, where there is any (docs/methods.md, "Density field"). MARK enters the bricks that points reach
 // in the directory, block by block, NUMBER numbers them, SCATTER adds each point's share to the nodes that it reaches, as whole numbers, whose
-// sum does not hang on the order, and lists the balls in each brick; STRAY makes balls, too, of the body's particles that the field does not enclose; FINISH finds the cells that hold the surface, and puts together what
-// a walk looks at in them.
+// sum does not hang on the order, and lists the balls in each brick; BALLS lists them alone, where something else adds the shares
+// (dense_grid.comp); STRAY makes balls, too, of the body's particles that the field does not enclose; FINISH finds the cells that hold
+// the surface, and puts together what a walk looks at in them.
 #version 460
-// Compiled with one of: MARK, NUMBER, SCATTER, STRAY, FINISH
+// Compiled with one of: MARK, NUMBER, SCATTER, BALLS, STRAY, FINISH
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"
@@ -37,33 +38,7 @@ layout(constant_id = 1) const bool ORIGIN_ON_DEVICE = false; // the liquid's own
 #endif
 
 #ifndef FINISH
-// Node at or before a point, and how far beyond it that lies, in spacings.
-ivec3 node_of(vec3 x, out vec3 part) {
-    return ivec3(cell_of(x.x, build.spacing, part.x), cell_of(x.y, build.spacing, part.y), cell_of(x.z, build.spacing, part.z));
-}
-
-// A point among the bricks. A particle of the body reaches as far as its kernel, another is a ball.
-struct Reach {
-    ivec3 node;  // at or before it
-    vec3 part;   // how far beyond that it lies, in spacings
-    float reach; // in spacings
-    ivec3 first; // of the bricks of the cells with a node that it reaches
-    ivec3 last;  // two further on at most
-};
-Reach reach_of(vec4 point) {
-    Reach r;
-    r.node = node_of(point.xyz, r.part);
-    r.reach = point.w < 0.0 ? build.ball : build.reach;
-    r.first = field_brick(r.node + ivec3(floor(r.part - r.reach)));
-    r.last = field_brick(r.node + ivec3(ceil(r.part + r.reach)) - 1);
-    return r;
-}
-
-// Whether a brick's cells lie nearer to the point than it reaches.
-bool reaches(Reach r, ivec3 brick) {
-    vec3 low = vec3((brick << FIELD_BRICK_BITS) - r.node) - r.part, across = max(max(low, -low - float(FIELD_BRICK)), 0.0);
-    return dot(across, across) < r.reach * r.reach;
-}
+#include "field_reach.glsl"
 
 // The k-th of eight blocks that its bricks can be in.
 ivec3 block_of(Reach r, uint k) { return field_brick(r.first) + ivec3(k & 1u, (k >> 1) & 1u, k >> 2); }
@@ -180,7 +155,7 @@ void main() {
 }
 #endif
 
-#if defined(SCATTER) || defined(STRAY)
+#if defined(SCATTER) || defined(BALLS) || defined(STRAY)
 layout(set = 0, binding = 8, std430) writeonly buffer BallBlock { uvec2 at[]; } balls;
 
 // Enters a ball in the list of a brick, the k-th of a slot's block.
@@ -231,10 +206,16 @@ layout(constant_id = 1) const int ACROSS = 6; // nodes that a kernel can reach o
 
 // Of the three bricks along each axis those in which a row of nodes lies.
 uvec3 one_of(uvec3 first, uvec3 second, uvec3 third, int which) { return which == 0 ? first : which == 1 ? second : third; }
+#endif
 
+#if defined(SCATTER) || defined(BALLS)
 void main() {
     uint i = invocation();
+#ifdef SCATTER
     if (i >= build.count || points.at[i].w == 0.0) return;
+#else
+    if (i >= build.count || points.at[i].w >= 0.0) return;
+#endif
     vec4 point = points.at[i];
     Reach r = reach_of(point);
     bool ball = point.w < 0.0;
@@ -263,8 +244,9 @@ void main() {
         numbers[k / 3][k % 3] = number;
         for (bool list = ball && number > 0u && reaches(r, brick); list; list = false) list_ball(r, brick, slots[b], local, number);
     }
+#ifdef SCATTER
     if (ball) return;
-    float unit = build.unit / max(min(point.w, FIELD_DENSEST), FIELD_CROWD * point.w), per_reach = 1.0 / build.reach;
+    float unit = unit_of(point), per_reach = 1.0 / build.reach;
     // Nodes from the first that it can reach on, in spacings from the point, and among those of its bricks.
     ivec3 low = ivec3(floor(r.part - build.reach)) + 1, at = r.node + low - (r.first << FIELD_BRICK_BITS);
     vec3 offset = vec3(low) - r.part;
@@ -293,6 +275,7 @@ void main() {
             }
         }
     }
+#endif
 }
 #endif
 

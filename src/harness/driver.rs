@@ -4,7 +4,6 @@ use crate::{
     Background, Camera, Class, FrameInput, Particles, Point, SceneInput, Settings,
     host::{Gpu, Instance, Session, Upload},
     inspect::{self, Inspection},
-    layers::Layers,
     prepare::{self, DeviceIds, DevicePositions},
     shader::Frame,
     space::Space,
@@ -116,7 +115,7 @@ impl<'a> Driver<'a> {
     pub fn give(&self, case: &Case) {
         let renderer = &mut self.session.borrow_mut().renderer;
         renderer.set_particles(&case.particles).expect("particles");
-        if let Layers::Field(_) = case.settings.method.layers {
+        if case.settings.method.layers.field().is_some() {
             let p = &case.particles;
             let positions: Vec<Vec3> = p.ellipsoids.iter().map(|e| e.center).collect();
             let class = |i| if i < p.splash_count { Class::Splash } else { Class::Body };

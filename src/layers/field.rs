@@ -4,7 +4,7 @@
 #[cfg(feature = "inspect")]
 pub mod twin;
 
-use super::{Kind, Layering};
+use super::{Filling, Kind, Layering};
 use crate::{
     frame::Scene,
     method::Offers,
@@ -108,8 +108,19 @@ impl Field {
         }
     }
 
-    /// Builds it.
-    pub(crate) fn record(&self, plan: &mut Plan, scene: &Scene, points: &Points) -> Volume {
+    /// Nodes that a kernel can reach on an axis.
+    pub(super) fn across(build: &FieldBuild) -> u32 {
+        (2.0 * build.reach).ceil() as u32
+    }
+
+    /// Builds it; what `add` does between its passes brings the particles' shares to the nodes and lists the balls.
+    pub(super) fn build_by(
+        &self,
+        plan: &mut Plan,
+        scene: &Scene,
+        points: &Points,
+        add: impl FnOnce(&mut Plan, &Building),
+    ) -> Volume {
         let build = self.build(scene);
         let words = |n: u32| 4 * u64::from(n);
         let head = plan.buffer("field head", size_of::<FieldHead>() as u64);
@@ -121,45 +132,73 @@ impl Field {
         for zeros in [head, table, records, nodes] {
             plan.fill("field", zeros, 0, vk::WHOLE_SIZE, 0);
         }
-        let call = |shader: &'static Shader| Call::compute(shader).update("table", table).push_all(&build);
+        let building = Building { head, table, records, nodes, balls, points: points.points, build };
         // Where the host prepared the points, the shaders do not look; something has to be bound all the same.
         let from_origin = |call: Call| {
             let extent = points.extent.unwrap_or(points.points);
             call.read("extent", extent).constant("ORIGIN_ON_DEVICE", points.extent.is_some())
         };
-        let mark = from_origin(call(&FIELD_MARK_COMP)).read("points", points.points).counting(&COUNTED);
+        let mark = from_origin(building.call(&FIELD_MARK_COMP)).read("points", points.points);
         plan.dispatch("field", mark, per_particle(build.count));
-        let number = from_origin(call(&FIELD_NUMBER_COMP))
+        let number = from_origin(building.call(&FIELD_NUMBER_COMP))
             .update("head", head)
             .read("points", points.points)
-            .update("records", records)
-            .counting(&COUNTED);
+            .update("records", records);
         plan.dispatch("field", number, per_particle(build.slots));
-        let scatter = call(&FIELD_SCATTER_COMP)
-            .update("head", head)
-            .read("points", points.points)
-            .update("records", records)
-            .update("nodes", nodes)
-            .write("balls", balls)
-            .constant("ACROSS", (2.0 * build.reach).ceil() as u32)
-            .counting(&COUNTED);
-        plan.dispatch("field", scatter, per_particle(build.count));
-        let stray = call(&FIELD_STRAY_COMP)
-            .update("head", head)
-            .read("points", points.points)
-            .update("records", records)
-            .read("nodes", nodes)
-            .update("balls", balls)
-            .counting(&COUNTED);
+        add(plan, &building);
+        let stray = building.listing(&FIELD_STRAY_COMP).read("nodes", nodes);
         plan.dispatch("field", stray, per_particle(build.count));
-        let finish = call(&FIELD_FINISH_COMP)
+        let finish = building
+            .call(&FIELD_FINISH_COMP)
             .read("head", head)
             .update("records", records)
             .read("nodes", nodes)
-            .write("cells", cells)
-            .counting(&COUNTED);
+            .write("cells", cells);
         plan.dispatch("field", finish, Groups::Indirect(head, 0));
         Volume { head, table, records, cells, balls, build, spacing: self.spacing }
+    }
+}
+
+impl Filling for Field {
+    fn field(&self) -> Field {
+        *self
+    }
+
+    fn record(&self, plan: &mut Plan, scene: &Scene, points: &Points) -> Volume {
+        self.build_by(plan, scene, points, |plan, building| {
+            let scatter = building
+                .listing(&FIELD_SCATTER_COMP)
+                .update("nodes", building.nodes)
+                .constant("ACROSS", Field::across(&building.build));
+            plan.dispatch("field", scatter, per_particle(building.build.count));
+        })
+    }
+}
+
+/// A field while it is built.
+pub(super) struct Building {
+    pub head: Target,
+    pub table: Target,
+    pub records: Target,
+    pub nodes: Target,
+    pub balls: Target,
+    pub points: Target,
+    pub build: FieldBuild,
+}
+
+impl Building {
+    /// One of its passes.
+    fn call(&self, shader: &'static Shader) -> Call {
+        Call::compute(shader).update("table", self.table).push_all(&self.build).counting(&COUNTED)
+    }
+
+    /// One that lists balls.
+    pub fn listing(&self, shader: &'static Shader) -> Call {
+        self.call(shader)
+            .update("head", self.head)
+            .read("points", self.points)
+            .update("records", self.records)
+            .update("balls", self.balls)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Which surfaces are kept of the particles: maps of linear depth and normals, nearest fronts and farthest backs.
 
+pub mod dense_grid;
 pub mod field;
 pub mod front;
 pub mod nearest_farthest;
@@ -11,7 +12,7 @@ use crate::{
     method::Offers,
     optics::tiles::Tiles,
     parameters::family,
-    passes::Drawn,
+    passes::{Drawn, Points},
     plan::{Plan, Target},
 };
 
@@ -22,6 +23,7 @@ family! {
         NearestFarthest(nearest_farthest) = "nearest-farthest",
         Front(front) = "front",
         Field(field) = "field",
+        DenseGrid(dense_grid) = "dense-grid",
     }
 }
 
@@ -38,7 +40,25 @@ pub(crate) enum Kind<'a> {
     /// Maps of a view, of particles drawn.
     Maps(&'a dyn Mapping),
     /// A field around the particles, whatever the view.
-    Field(&'a field::Field),
+    Field(&'a dyn Filling),
+}
+
+impl Layers {
+    /// The density field that they are, if they are one, whatever fills it.
+    pub fn field(&self) -> Option<field::Field> {
+        match self.member().kind() {
+            Kind::Maps(_) => None,
+            Kind::Field(filling) => Some(filling.field()),
+        }
+    }
+}
+
+/// Layers that are a density field.
+pub(crate) trait Filling {
+    /// Which.
+    fn field(&self) -> field::Field;
+    /// Builds it.
+    fn record(&self, plan: &mut Plan, scene: &Scene, points: &Points) -> field::Volume;
 }
 
 /// Layers that are maps of a view.

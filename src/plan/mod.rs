@@ -156,6 +156,11 @@ impl Plan {
         self.wrong.get_or_insert(Error::Pass { pass, problem });
     }
 
+    /// Says what the device or the settings have no room for; the first error becomes the plan's.
+    pub fn fail(&mut self, error: Error) {
+        self.wrong.get_or_insert(error);
+    }
+
     pub fn resource(&self, target: Target) -> &Declared {
         &self.resources[target.0]
     }

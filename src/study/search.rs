@@ -5,7 +5,6 @@ use crate::{
     Equirect, Particles, Settings,
     host::{HostError, Session},
     inspect::Walk,
-    layers::Layers,
     shader::{Frame, OUTCOME_NO_LIQUID},
     space::Space,
     twin::{
@@ -72,9 +71,9 @@ impl Walked {
         }
         let walks = floats(read(Some("walk (debug)"), 0)?);
         let directions = floats(read(Some("final direction (debug)"), 0)?);
-        let field = match &settings.method.layers {
-            Layers::Field(field) => BuiltField::read(session, field, particles.radius)?,
-            _ => None,
+        let field = match settings.method.layers.field() {
+            Some(field) => BuiltField::read(session, &field, particles.radius)?,
+            None => None,
         };
         let space = super::built_field::space(session, particles)?;
         Ok(Walked { frame, maps, field, space, walks, directions })

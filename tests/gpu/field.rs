@@ -49,7 +49,7 @@ fn packed(points: &[Point], radius: f32) -> Vec<Vec4> {
 }
 
 /// Those that the device has made.
-fn made(shot: &Shot) -> Vec<Vec4> {
+pub fn made(shot: &Shot) -> Vec<Vec4> {
     shot.floats("particle points", 0).expect("points").chunks_exact(4).map(Vec4::from_slice).collect()
 }
 
@@ -58,16 +58,16 @@ pub fn words(shot: &Shot) -> Words<'_> {
 }
 
 /// Nodes, cells, their corners and balls of a brick.
-type Content = (Vec<u32>, u64, Vec<[Corner; 8]>, BTreeSet<[u32; 3]>);
+pub type Content = (Vec<u32>, u64, Vec<[Corner; 8]>, BTreeSet<[u32; 3]>);
 
 /// What of a field does not hang on how its bricks are numbered.
-fn content(shot: &Shot) -> BTreeMap<Place, Content> {
+pub fn content(shot: &Shot) -> BTreeMap<Place, Content> {
     let bricks = words(shot).bricks();
     let balls = |b: &Brick| b.balls.iter().map(|c| c.map(f32::to_bits)).collect();
     bricks.iter().map(|(place, b)| (*place, (b.nodes.clone(), b.cells, b.corners.clone(), balls(b)))).collect()
 }
 
-fn block(n: [i32; 3], radius: f32, origin: Vec3, jitter: f32) -> Vec<Vec3> {
+pub fn block(n: [i32; 3], radius: f32, origin: Vec3, jitter: f32) -> Vec<Vec3> {
     let mut random = Random(3);
     let mut all = Vec::new();
     for x in 0..n[0] {
@@ -82,7 +82,7 @@ fn block(n: [i32; 3], radius: f32, origin: Vec3, jitter: f32) -> Vec<Vec3> {
 }
 
 /// Name, radius and positions.
-fn clouds() -> Vec<(&'static str, f32, Vec<Vec3>)> {
+pub fn clouds() -> Vec<(&'static str, f32, Vec<Vec3>)> {
     let mut random = Random(8);
     let mut spray = block([9, 8, 7], 0.05, Vec3::new(-0.5, -0.4, -0.3), 0.4);
     spray.extend((0..60).map(|_| random.point(Vec3::splat(-1.2), Vec3::splat(1.2))));
@@ -104,7 +104,14 @@ fn clouds() -> Vec<(&'static str, f32, Vec<Vec3>)> {
     ]
 }
 
-fn check(shot: &Shot, points: &[Vec4], lattice: &Lattice, label: &str) {
+/// What a node may be off by, of so many points and such a sum.
+type Rounding = dyn Fn(f64, f64) -> f64;
+
+/// Shares that are whole numbers, and their float arithmetic.
+const WHOLE_SHARES: &Rounding = &|count, sum| 0.7 * count + 3e-6 * sum + 1.0;
+
+/// Compares a field with its twin. `added`: of the points those whose shares it has.
+pub fn check(shot: &Shot, [points, added]: [&[Vec4]; 2], lattice: &Lattice, rounding: &Rounding, label: &str) {
     let words = words(shot);
     let bricks = words.bricks();
     // Which there are. Where rounding decides, both are right.
@@ -118,7 +125,7 @@ fn check(shot: &Shot, points: &[Vec4], lattice: &Lattice, label: &str) {
     assert_eq!(left_out.map(|name| shot.counter(name)), [0; 3], "{label}");
 
     // The field at each node.
-    let wanted = lattice.nodes(points);
+    let wanted = lattice.nodes(added);
     let (mut worst, mut inside) = (0f64, 0);
     let one = f64::from(FIELD_ONE);
     for (place, brick) in &bricks {
@@ -126,15 +133,15 @@ fn check(shot: &Shot, points: &[Vec4], lattice: &Lattice, label: &str) {
             let node = [0, 1, 2].map(|axis| 4 * place[axis] + (k >> (2 * axis) & 3) as i32);
             let (sum, count) = wanted.get(&node).copied().unwrap_or_default();
             let sum = one * sum;
-            let off = (f64::from(*found) - sum).abs() / (0.7 * f64::from(count) + 3e-6 * sum + 1.0);
+            let off = (f64::from(*found) - sum).abs() / rounding(f64::from(count), sum);
             assert!(off <= 1.0, "{label}: node {node:?} of {count} points holds {found} instead of {sum}");
             worst = worst.max(off);
             inside += usize::from(sum >= one * lattice.level);
         }
     }
-    let lost = wanted
-        .iter()
-        .find(|(node, (sum, count))| one * sum > 0.7 * f64::from(*count) + 1.0 && node_of(&bricks, **node) == 0);
+    let lost = wanted.iter().find(|(node, (sum, count))| {
+        one * sum > rounding(f64::from(*count), one * sum) && node_of(&bricks, **node) == 0
+    });
     assert!(lost.is_none(), "{label}: {lost:?}");
 
     // What follows from the nodes.
@@ -210,10 +217,10 @@ fn nodes_bricks_and_flags_are_the_twins() {
             let case = Case { settings: settings(field, "one"), ..empty(radius) };
             each_driver(|driver| {
                 let (shot, points) = shoot(driver, &positions, &case);
-                check(&shot, &points, &lattice, &format!("{}: {name}", driver.name));
+                check(&shot, [&points; 2], &lattice, WHOLE_SHARES, &format!("{}: {name}", driver.name));
                 let shot = driver.shoot_cloud_unlisted(&case, &Cloud::new(&positions, Search::Runs));
                 let own = made(&shot);
-                check(&shot, &own, &lattice, &format!("{}: {name}, on the device", driver.name));
+                check(&shot, [&own; 2], &lattice, WHOLE_SHARES, &format!("{}: {name}, on the device", driver.name));
                 // The device's points are the host's.
                 let sorted = |points: &[Vec4]| {
                     let mut all = points.to_vec();

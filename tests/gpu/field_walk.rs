@@ -10,7 +10,7 @@ use crate::{
 use glam::{DVec3, Vec3};
 use meniscus::{
     Background, Class, Point,
-    layers::{Layers, field::Field},
+    layers::field::Field,
     prepare::{Input, Options, points},
     shader::{
         Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED, OUTCOME_REFLECTION_LIMIT,
@@ -74,7 +74,7 @@ fn walked(shot: &Shot) -> Vec<Walk> {
 }
 
 fn twin_of(shot: &Shot, case: &Case, frame: &Frame, pixel: usize) -> Walk {
-    let Layers::Field(own) = case.settings.method.layers else { unreachable!("a field") };
+    let own = case.settings.method.layers.field().expect("a field");
     let bricks = words(shot).bricks();
     walk_in(shot, &bricks, own, case, frame, None, pixel)
 }
@@ -134,7 +134,7 @@ fn compare(driver: &Driver, case: &Case, every: usize) -> Vec<Walk> {
 fn compare_shot(driver: &Driver, case: &Case, shot: &Shot, every: usize) -> Vec<Walk> {
     let found = walked(shot);
     let bricks = words(shot).bricks();
-    let Layers::Field(own) = case.settings.method.layers else { unreachable!("a field") };
+    let own = case.settings.method.layers.field().expect("a field");
     let shifted = [-1e-4, 1e-4].map(|off| Frame { ior: shot.frame.ior * (1.0 + off), ..shot.frame });
     let pair = |i: usize| {
         let twin = |frame: &Frame| walk_in(shot, &bricks, own, case, frame, None, i);
@@ -282,7 +282,7 @@ fn the_hosts_scene_is_met() {
     };
     let case = case(Field::default(), 4, 4);
     let painted = painted(SIZE, blocks);
-    let Layers::Field(own) = case.settings.method.layers else { unreachable!("a field") };
+    let own = case.settings.method.layers.field().expect("a field");
     each_driver(|driver| {
         for (background, tracing) in
             [(Background::Environment, 0), (Background::Host, 0), (Background::Environment, 3), (Background::Host, 3)]

@@ -11,6 +11,7 @@ mod built_field;
 mod classes;
 mod compact;
 mod cull;
+mod dense_grid;
 mod drivers;
 mod environment;
 mod extent;

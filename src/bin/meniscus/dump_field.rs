@@ -5,10 +5,7 @@ use glam::{DVec3, IVec3};
 use meniscus::{
     Class,
     host::Session,
-    layers::{
-        Layers,
-        field::twin::{Lattice, Words},
-    },
+    layers::field::twin::{Lattice, Words},
     shader::{FIELD_ONE, FIELD_SLOT},
 };
 use serde_json::{Value, json};
@@ -19,7 +16,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 /// Writes it by `write`, file by file, where the frame has one.
 pub fn write(job: &Job, session: &mut Session, mut write: impl FnMut(&str, Vec<u8>) -> Result<()>) -> Result<()> {
     let radius = job.scene.particles.radius;
-    let Layers::Field(field) = job.settings.method.layers else { return Ok(()) };
+    let Some(field) = job.settings.method.layers.field() else { return Ok(()) };
     let Some(buffers) = session.all_words(Words::BUFFERS)? else { return Ok(()) };
     let all = Words::new(buffers.each_ref().map(Vec::as_slice));
     let (directory, bricks) = (all.directory, all.bricks());

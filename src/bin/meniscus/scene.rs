@@ -9,7 +9,6 @@ use meniscus::{
     ash::vk::ImageView,
     host::{Session, Upload},
     io::particles::{Invalid, ParticleFile, ReadError, check_finite, read_bytes, read_within},
-    layers::Layers,
     prepare::{self, DensityField, DevicePositions, Input, Options, PrepareError, Report, Search},
     shader,
 };
@@ -188,7 +187,7 @@ impl Scene {
         if prepare.on_device() {
             return Ok(Some(Upload::new(session.gpu, bytemuck::cast_slice(&self.positions))?));
         }
-        let points = if let Layers::Field(_) = settings.method.layers { Some(self.points()?) } else { None };
+        let points = settings.method.layers.field().map(|_| self.points()).transpose()?;
         self.give_to(&mut session.renderer, points.as_deref())?;
         Ok(None)
     }

@@ -5,7 +5,6 @@ use crate::{
     Camera, Class, FrameInput, Particles, Point, Settings,
     host::{HostError, Session},
     inspect::{self, Inspection, Walk},
-    layers::Layers,
     prepare::{self, Input, Options, PrepareError, prepare},
     shader::{OUTCOME_HIT, OUTCOME_SIDE_WALL},
     space::Space,
@@ -131,7 +130,7 @@ impl<'a, 'b> Rig<'a, 'b> {
 }
 
 fn is_field(settings: &Settings) -> bool {
-    matches!(settings.method.layers, Layers::Field(_))
+    settings.method.layers.field().is_some()
 }
 
 /// What a density field is made of: particles where they are drawn, in the classes that they have.

@@ -17,7 +17,6 @@ use meniscus::{
     host::Session,
     inspect::Inspection,
     io::images,
-    layers::Layers,
     optics::Optics,
     profile::FrameTimes,
     study::{
@@ -56,7 +55,7 @@ pub fn all(
     session: &mut Session,
 ) -> Result<Vec<(String, Point)>, Box<dyn Error>> {
     // A density field is made of other things than maps are.
-    let of_points = |settings: &Settings| matches!(settings.method.layers, Layers::Field(_));
+    let of_points = |settings: &Settings| settings.method.layers.field().is_some();
     let mut given = None;
     let mut upload = None;
     let (camera, eye, _) = job.picture.camera(job.scene)?;

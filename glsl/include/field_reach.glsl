@@ -1,0 +1,32 @@
+// Which nodes and bricks of the density field a point reaches. Of the push constants `build` is a FieldBuild.
+
+// Node at or before a point, and how far beyond it that lies, in spacings.
+ivec3 node_of(vec3 x, out vec3 part) {
+    return ivec3(cell_of(x.x, build.spacing, part.x), cell_of(x.y, build.spacing, part.y), cell_of(x.z, build.spacing, part.z));
+}
+
+// A point among the bricks. A particle of the body reaches as far as its kernel, another is a ball.
+struct Reach {
+    ivec3 node;  // at or before it
+    vec3 part;   // how far beyond that it lies, in spacings
+    float reach; // in spacings
+    ivec3 first; // of the bricks of the cells with a node that it reaches
+    ivec3 last;  // two further on at most
+};
+Reach reach_of(vec4 point) {
+    Reach r;
+    r.node = node_of(point.xyz, r.part);
+    r.reach = point.w < 0.0 ? build.ball : build.reach;
+    r.first = field_brick(r.node + ivec3(floor(r.part - r.reach)));
+    r.last = field_brick(r.node + ivec3(ceil(r.part + r.reach)) - 1);
+    return r;
+}
+
+// Whether a brick's cells lie nearer to the point than it reaches.
+bool reaches(Reach r, ivec3 brick) {
+    vec3 low = vec3((brick << FIELD_BRICK_BITS) - r.node) - r.part, across = max(max(low, -low - float(FIELD_BRICK)), 0.0);
+    return dot(across, across) < r.reach * r.reach;
+}
+
+// What a particle of the body adds where its kernel is 1, in whole numbers of a node.
+float unit_of(vec4 point) { return build.unit / max(min(point.w, FIELD_DENSEST), FIELD_CROWD * point.w); }
