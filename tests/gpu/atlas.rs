@@ -153,7 +153,7 @@ fn outputs_of_each_kind_in_each_layout() {
             renderer.resize(SIZE).expect("size");
             renderer.set_particles(&case.particles).expect("particles");
             // SAFETY: recorded outside rendering, before any frame.
-            gpu.run(|cmd| Ok(unsafe { renderer.set_environment(cmd, &crate::drivers::SKY) }?)).expect("environment");
+            gpu.run(|cmd| Ok(unsafe { renderer.set_environment(cmd, &meniscus::harness::SKY) }?)).expect("environment");
             for layout in [ATTACHED, Layout::ATTACHMENT_OPTIMAL, Layout::GENERAL] {
                 let output = image(gpu, format, texel, SIZE, layout);
                 let input = new(&case, &output).output_layout(layout);

@@ -3,10 +3,9 @@
 
 use crate::{
     background::{HostScene, Painted, painted},
-    drivers::SKY,
     field::words,
     field_walk, half,
-    support::{Case, Choose, Driver, Shot, camera, each_driver, imai16, random_cloud},
+    support::{Case, Choose, Driver, SKY, Shot, camera, each_driver, imai16, random_cloud},
     surface::asking,
     walk::{OwnMaps, degrees},
 };
