@@ -7,6 +7,7 @@ mod compositing;
 mod drivers;
 mod films;
 mod keys;
+mod memory;
 mod outputs;
 mod pipelines;
 mod profiling;

@@ -32,6 +32,8 @@ pub struct Row {
     pub encode_ms: f64,
     /// Mean difference from the last picture's colours, of 1.
     pub change: Option<f64>,
+    /// Particles whose class is another than in the frame before.
+    class_changes: Option<usize>,
     /// Why it shows no liquid, if it shows none.
     pub note: Option<String>,
 }
@@ -50,7 +52,8 @@ const HEADER: [&str; 12] = [
     "gpu_ms",
     "encode_ms",
 ];
-const CHANGE: &str = "change";
+/// From the picture before, and from the frame before.
+const CHANGES: [&str; 2] = ["change", "class_changes"];
 
 impl Row {
     pub fn new(shot: &Shot) -> Row {
@@ -62,6 +65,7 @@ impl Row {
         (self.splash, self.body, self.dropped) = (report.splash, report.body, scene.dropped);
         self.read_ms += ready.read_ms;
         self.prepare_ms += ready.prepare_ms;
+        self.class_changes = ready.class_changes;
     }
 
     fn cells(&self, file: String) -> Vec<String> {
@@ -72,6 +76,7 @@ impl Row {
         cells.extend(counts.into_iter().chain(times));
         cells.extend([self.gpu_ms.map_or(String::new(), ms), ms(self.encode_ms)]);
         cells.push(self.change.map_or(String::new(), |c| format!("{c:.6}")));
+        cells.push(self.class_changes.map_or(String::new(), |c| c.to_string()));
         cells
     }
 }
@@ -107,7 +112,7 @@ impl<'a> Table<'a> {
 
     pub fn write(&mut self) -> Result<(), OutputError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        let header: Vec<_> = HEADER.iter().chain([&CHANGE]).map(|h| (*h).to_owned()).collect();
+        let header: Vec<_> = HEADER.iter().chain(&CHANGES).map(|h| (*h).to_owned()).collect();
         // Into memory, rows of one length: nothing can fail.
         for row in [&header].into_iter().chain(self.rows.values()) {
             writer.write_record(row).expect("rows of one length");
@@ -120,7 +125,7 @@ impl<'a> Table<'a> {
 fn older(path: &Path) -> Option<BTreeMap<u64, Vec<String>>> {
     let mut reader = csv::Reader::from_path(path).ok().filter(|_| path.is_file())?;
     let header = reader.headers().ok()?.clone();
-    if header.iter().ne(HEADER.into_iter().chain([CHANGE])) {
+    if header.iter().ne(HEADER.into_iter().chain(CHANGES)) {
         return None;
     }
     let row = |r: csv::StringRecord| Some((r.get(0)?.parse().ok()?, r.iter().map(str::to_owned).collect()));
