@@ -24,6 +24,8 @@ mod study;
 mod terminal;
 #[cfg(feature = "study")]
 mod tune;
+#[cfg(feature = "study")]
+mod units;
 
 use std::{
     fs,
