@@ -72,6 +72,34 @@ pub fn classify(
     Ok(classes)
 }
 
+/// ρ/ρ0 of every particle, in the order of `positions`.
+pub fn densities(positions: &[Vec3], radius: f32, options: &Options) -> Result<Vec<f32>, PrepareError> {
+    let scale = Scale::new(radius, options)?;
+    check_positions(positions)?;
+    let grid = Grid::new(positions, scale.support, |a, b| a.cmp(&b))?;
+    let mut all = vec![0.0; positions.len()];
+    for (&index, density) in grid.order.iter().zip(relative_densities(&grid, scale, options.search)) {
+        all[index as usize] = density as f32;
+    }
+    Ok(all)
+}
+
+/// The classes after several frames whose [`densities`] are these, the first one's first: as [`classify`] has them where it is told
+/// of each frame's classes in the next. They hang on these frames alone, whatever was before.
+pub fn classes_over(frames: &[&[f32]], options: &Options, upper: f32) -> Result<Vec<Class>, PrepareError> {
+    let Some((first, later)) = frames.split_first() else { return Ok(Vec::new()) };
+    let mut classes: Vec<Class> = first.iter().map(|d| class_of((*d).into(), options)).collect();
+    for frame in later {
+        check_lengths("densities", Some(frame.len()), classes.len())?;
+        for (class, density) in classes.iter_mut().zip(*frame) {
+            if !(options.splash_threshold..upper).contains(density) {
+                *class = class_of((*density).into(), options);
+            }
+        }
+    }
+    Ok(classes)
+}
+
 /// Splash where ρ/ρ0 lies below the threshold (Imai16 §4.1).
 pub(super) fn class_of(relative_density: f64, options: &Options) -> Class {
     if relative_density < f64::from(options.splash_threshold) { Class::Splash } else { Class::Body }

@@ -26,7 +26,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DMat3, Mat3, Vec3};
 
 pub(crate) use density::rest_density;
-pub use density::{DensityField, classify};
+pub use density::{DensityField, classes_over, classify, densities};
 pub(crate) use device::Words;
 pub use device::{DeviceIds, DevicePositions};
 pub use neighbours::Search;

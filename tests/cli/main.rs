@@ -9,6 +9,7 @@ mod films;
 mod info;
 mod installed;
 mod keys;
+mod memory;
 mod outputs;
 mod pipelines;
 mod profiling;
@@ -26,6 +27,8 @@ mod submit;
 mod terminal;
 #[cfg(feature = "study")]
 mod tune;
+#[cfg(feature = "study")]
+mod units;
 mod workload;
 
 use std::{

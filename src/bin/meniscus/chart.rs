@@ -17,6 +17,7 @@ use crate::{
     scene::Prepare,
     scene_file, terminal,
     truth::{self, Truth, cache::Cache},
+    units,
 };
 use meniscus::{
     Settings,
@@ -72,6 +73,8 @@ pub struct Args {
     /// Folder for meshes and films of truths; `cache` in the output's if not given
     #[arg(long, value_name = "DIR")]
     pub cache: Option<PathBuf>,
+    #[command(flatten)]
+    pub units: units::Units,
 }
 
 /// A scene with all that was measured of it.
@@ -111,6 +114,12 @@ pub fn unbeaten(points: &[(String, Point)]) -> Vec<usize> {
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let scenes = args.pictures()?;
+    // A unit is a scene: its ways are measured in turns.
+    let names: Vec<_> = scenes.iter().map(|(name, _)| name.clone()).collect();
+    if args.units.listed(&names)? {
+        return Ok(ExitCode::SUCCESS);
+    }
+    let some = args.units.some(&names)?;
     let plans: Vec<_> = scenes.iter().map(|(_, picture)| args.ways(picture)).collect::<Result<_, _>>()?;
     let instance = Instance::new(false)?;
     let device = instance.pick(args.options.device.as_deref())?;
@@ -123,9 +132,14 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let on_device = on(&device);
     let gpu = Gpu::new(&instance, device).map_err(|e| on_device(e.into()))?;
     let mut charted = Vec::new();
-    for ((name, picture), ways) in scenes.iter().zip(&plans) {
+    let wanted = |i: usize| some.as_ref().is_none_or(|s| s.contains(&i));
+    for (_, ((name, picture), ways)) in scenes.iter().zip(&plans).enumerate().filter(|(i, _)| wanted(*i)) {
         let one = args.chart((name, picture, ways), &gpu, &store, &cache, &label);
         charted.push(one.map_err(&on_device).map_err(|e| format!("{name}: {e}"))?);
+    }
+    if some.is_some() {
+        terminal::progress(format!("{} of {} units are in {}", charted.len(), names.len(), args.output.display()));
+        return Ok(ExitCode::SUCCESS);
     }
     outputs::write(&args.output.join("chart.csv"), csv(&charted).as_bytes())?;
     let mut drawn = Vec::new();

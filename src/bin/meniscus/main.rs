@@ -40,6 +40,8 @@ mod terminal;
 mod truth;
 #[cfg(feature = "study")]
 mod tune;
+#[cfg(feature = "study")]
+mod units;
 #[cfg(feature = "view")]
 mod view;
 mod workload;

@@ -53,6 +53,9 @@ pub struct Picture {
     /// Whether the absorption of the settings is meant, or is to suit the liquid's size.
     #[serde(skip)]
     pub absorption_given: bool,
+    /// Below what share of a filled body's density classes were kept from frame to frame, if they were.
+    #[serde(skip)]
+    pub keep_class_below: Option<f32>,
     /// Whether the size is meant, or is to be a camera file's, if there is one.
     #[serde(skip)]
     pub size_given: bool,
@@ -88,6 +91,7 @@ impl Default for Picture {
             preparation: prepare::Options::default(),
             settings: Settings::default(),
             absorption_given: false,
+            keep_class_below: None,
             size_given: false,
         }
     }

@@ -95,8 +95,7 @@ impl Scene {
         prepare: Prepare,
     ) -> Result<Scene, Box<dyn Error>> {
         let path = name(source);
-        let origin = origin(&file.positions);
-        let positions: Vec<Vec3> = file.positions.iter().map(|p| (*p - origin).as_vec3()).collect();
+        let (origin, positions) = local(&file.positions);
         drop(file.positions); // twice as large as what was made of them
         let (radius, radius_source) = match (picture.radius, file.radius, source) {
             (Some(r), _, _) => (r, "given"),
@@ -124,7 +123,10 @@ impl Scene {
                     .into(),
             );
         }
-        let input = Input::new(&positions, radius as f32).classes(classes.as_deref()).ellipsoids(axes.as_deref());
+        let input = Input::new(&positions, radius as f32)
+            .classes(classes.as_deref())
+            .ellipsoids(axes.as_deref())
+            .keep_class_below(picture.keep_class_below);
         let velocities: Option<Vec<Vec3>> =
             file.velocities.as_ref().map(|all| all.iter().map(|v| v.as_vec3()).collect());
         let (particles, report, speeds, prepare_ms) = make(&input, velocities.as_deref(), &options, prepare)?;
@@ -271,6 +273,12 @@ fn uniform(input: &Input, options: &Options) -> Particles {
     let axes = Mat3::from_diagonal(Vec3::splat(radius * options.longest().max(shader::SPLASH_RADIUS)));
     let ellipsoids = input.positions.iter().map(|p| Ellipsoid { center: *p, axes }).collect();
     Particles { radius, ellipsoids, splash_count: 0 }
+}
+
+/// Positions relative to an origin that keeps single precision precise, and that.
+pub fn local(positions: &[DVec3]) -> (DVec3, Vec<Vec3>) {
+    let origin = origin(positions);
+    (origin, positions.iter().map(|p| (*p - origin).as_vec3()).collect())
 }
 
 /// Zero, or the middle of a cloud that lies so far out that single precision would coarsen it.

@@ -6,8 +6,9 @@
 mod ahead;
 mod between;
 mod film;
-mod frames;
+pub mod frames;
 mod kept;
+mod memory;
 mod plan;
 mod table;
 mod writer;
@@ -79,6 +80,15 @@ pub struct Args {
     /// With --subframes: the part of a picture's time in which the shutter is open; 0.5 if not given
     #[arg(long, value_name = "SHARE", requires = "subframes", value_parser = above_zero)]
     pub shutter: Option<f64>,
+    /// Against particles that flicker between splash and body: the classes of so many frames before a picture's count. One becomes splash
+    /// below --splash-threshold, and body again from --keep-class-below on. Particles have to keep their order; where their number
+    /// changes it begins anew. Not with --prepare gpu; without it each frame stands for itself, as `render` has it
+    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub memory: Option<u32>,
+    /// With --memory: the share of a filled body's density from which on splash is body again; a tenth more than --splash-threshold if
+    /// not given
+    #[arg(long, value_name = "SHARE", requires = "memory", value_parser = above_zero)]
+    pub keep_class_below: Option<f64>,
     /// Leave out frames that cannot be read or prepared instead of ending at the first (a film shows the one before them); the
     /// exit code is 1 all the same
     #[arg(long)]

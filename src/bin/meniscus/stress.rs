@@ -1,13 +1,14 @@
 //! `meniscus stress`: where methods fail, swept; curves, and a table of what passes, what fails and why.
 
 mod curves;
+mod store;
 
 use crate::{
     choices, on, options,
     outputs::{self, OutputError},
     report,
     scene::progress,
-    terminal,
+    terminal, units,
 };
 use clap::builder::PossibleValuesParser;
 use meniscus::{
@@ -17,6 +18,7 @@ use meniscus::{
 };
 use serde_json::{Value, json};
 use std::{error::Error, path::PathBuf, process::ExitCode};
+use store::Store;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -32,6 +34,8 @@ pub struct Args {
     /// Fewer steps of each case: enough to see one fail
     #[arg(long)]
     pub small: bool,
+    #[command(flatten)]
+    pub units: units::Units,
     /// Device whose name or driver contains this; the best one if not given
     #[arg(long, value_name = "NAME")]
     pub device: Option<String>,
@@ -74,17 +78,31 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let methods: Vec<_> = methods.map(|p| (p.name, Settings::from(p.method()))).collect();
     let cases: Vec<_> =
         CASES.iter().filter(|c| args.only.is_empty() || args.only.iter().any(|o| o == c.name)).collect();
+    // A unit is what one method makes of one case.
+    let all: Vec<_> = cases.iter().flat_map(|case| methods.iter().map(move |(m, s)| (*case, *m, *s))).collect();
+    let names: Vec<_> = all.iter().map(|(case, method, _)| format!("{}/{method}", case.name)).collect();
+    if args.units.listed(&names)? {
+        return Ok(ExitCode::SUCCESS);
+    }
+    let some = args.units.some(&names)?;
     outputs::folder(&args.output)?;
     let instance = Instance::new(false)?;
     let device = instance.pick(args.device.as_deref())?;
     terminal::progress(format!("device: {}", device.label()));
+    let store = Store::open(&args.output, &device.label(), args.small)?;
     let on_device = on(&device);
     let gpu = Gpu::new(&instance, device).map_err(|e| on_device(e.into()))?;
     let mut session = Session::new(&gpu, [160, 120], &Equirect::procedural_sky()).map_err(|e| on_device(e.into()))?;
     let extent = if args.small { Extent::Small } else { Extent::Full };
-    let runs = all(&mut session, &cases, &methods, extent);
+    let wanted: Vec<_> =
+        all.iter().enumerate().filter(|(i, _)| some.as_ref().is_none_or(|s| s.contains(i))).map(|u| *u.1).collect();
+    let runs = sweep(&mut session, &wanted, extent, &store);
     session.end();
     let runs = runs.map_err(on_device)?;
+    if some.is_some() {
+        terminal::progress(format!("{} of {} units are in {}", runs.len(), all.len(), args.output.display()));
+        return Ok(ExitCode::SUCCESS);
+    }
     for case in &cases {
         let own: Vec<_> = runs.iter().filter(|r| r.case.name == case.name).collect();
         for (measure, name) in case.measures.iter().enumerate().map(|(i, m)| (i, m.name)) {
@@ -114,22 +132,29 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     Ok(if broken.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-fn all(
+/// All that these units find, which are run if they are not there.
+fn sweep(
     session: &mut Session,
-    cases: &[&'static Case],
-    methods: &[(&'static str, Settings)],
+    units: &[(&'static Case, &'static str, Settings)],
     extent: Extent,
+    store: &Store,
 ) -> Result<Vec<Run>, Box<dyn Error>> {
-    let bar = progress((cases.len() * methods.len()) as u64, "sweeps");
+    let bar = progress(units.len() as u64, "sweeps");
     let mut rig = Rig::new(session);
     let mut runs = Vec::new();
-    for case in cases {
-        for (method, settings) in methods {
-            let steps = case.run(&mut rig, settings, extent).map_err(|e| format!("{method}, {}: {e}", case.name))?;
-            let fault = case.fault(&steps);
-            runs.push(Run { case, method, steps, fault });
-            bar.inc(1);
-        }
+    for (case, method, settings) in units {
+        let steps = match store.steps(case, method, settings) {
+            Some(steps) => steps,
+            None => {
+                let steps =
+                    case.run(&mut rig, settings, extent).map_err(|e| format!("{method}, {}: {e}", case.name))?;
+                store.keep(case, method, settings, &steps)?;
+                steps
+            }
+        };
+        let fault = case.fault(&steps);
+        runs.push(Run { case, method, steps, fault });
+        bar.inc(1);
     }
     bar.finish_and_clear();
     Ok(runs)

@@ -4,7 +4,9 @@ use glam::Vec3;
 use meniscus::particles::Class;
 use meniscus::prepare::density::{lattice, rest_density, spline};
 use meniscus::prepare::ellipsoids::lattice_variance;
-use meniscus::prepare::{DensityField, Options, PrepareError, classify, estimate_radius, prepare};
+use meniscus::prepare::{
+    DensityField, Options, PrepareError, classes_over, classify, densities, estimate_radius, prepare,
+};
 
 use super::{Random, block, input, run};
 
@@ -77,6 +79,31 @@ fn two_thresholds_keep_the_last_class_between_them() {
     assert!(matches!(error, Err(PrepareError::Length { found: 5, particles: 6, .. })));
     let error = prepare(&input(&row, 1.0).keep_class_below(Some(f32::NAN)), &options);
     assert!(matches!(error, Err(PrepareError::Option { name: "upper splash threshold", .. })));
+}
+
+/// Frame by frame, of a cloud that trembles about the threshold, or all at once.
+#[test]
+fn classes_over_frames_are_those_from_frame_to_frame() {
+    let mut random = Random(17);
+    let options = Options { splash_threshold: 0.55, ..Options::default() };
+    let still = block([0; 3], [9, 3, 0]);
+    let frame = |random: &mut Random| still.iter().map(|p| *p + 0.4 * random.vec()).collect::<Vec<_>>();
+    let frames: Vec<_> = (0..6).map(|_| frame(&mut random)).collect();
+    let dense: Vec<_> = frames.iter().map(|f| densities(f, 1.0, &options).unwrap()).collect();
+    let mut last = classify(&frames[0], 1.0, &options, None).unwrap();
+    let mut held = 0;
+    for i in 0..6 {
+        if i > 0 {
+            last = classify(&frames[i], 1.0, &options, Some((&last, 0.75))).unwrap();
+        }
+        let all: Vec<_> = dense[..=i].iter().map(Vec::as_slice).collect();
+        assert_eq!(classes_over(&all, &options, 0.75).unwrap(), last, "frame {i}");
+        held += last.iter().zip(classify(&frames[i], 1.0, &options, None).unwrap()).filter(|(a, b)| **a != *b).count();
+    }
+    assert!(held > 5, "only {held} were held");
+    let short = classes_over(&[&dense[0], &dense[1][1..]], &options, 0.75);
+    assert!(matches!(short, Err(PrepareError::Length { found: 39, particles: 40, .. })), "{short:?}");
+    assert!(classes_over(&[], &options, 0.75).unwrap().is_empty());
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::{
     between::{Moment, between},
+    memory::Memory,
     ms_since,
     plan::{Exposure, Plan},
 };
@@ -20,6 +21,8 @@ pub struct Ready {
     pub read_ms: f64,
     /// All that came after reading: classes, ellipsoids, the density at the eye.
     pub prepare_ms: f64,
+    /// Particles whose class is another than in the frame before, where that is known.
+    pub class_changes: Option<usize>,
 }
 
 /// Starts the thread: it gives every exposure of the pictures that are not there, in order; of a picture whose frame cannot be
@@ -27,10 +30,10 @@ pub struct Ready {
 pub fn start<'s>(scope: &'s Scope<'s, '_>, plan: &'s Plan) -> Receiver<Result<Ready, String>> {
     let (give, ready) = sync_channel(0);
     scope.spawn(move || {
-        let mut read = Read::default();
+        let (mut read, mut memory) = (Read::default(), Memory::default());
         for shot in plan.shots.iter().filter(|s| !s.kept) {
             for exposure in &shot.exposures {
-                let next = load(plan, exposure, &mut read).map_err(|e| e.to_string());
+                let next = load(plan, exposure, &mut read, &mut memory).map_err(|e| e.to_string());
                 let failed = next.is_err();
                 if give.send(next).is_err() {
                     return; // nobody draws any more
@@ -46,7 +49,7 @@ pub fn start<'s>(scope: &'s Scope<'s, '_>, plan: &'s Plan) -> Receiver<Result<Re
 
 /// What was read of frames that are needed again: two at most.
 #[derive(Default)]
-struct Read(Vec<(usize, (ParticleFile, usize))>);
+pub struct Read(Vec<(usize, (ParticleFile, usize))>);
 
 impl Read {
     /// A frame's particles.
@@ -60,6 +63,14 @@ impl Read {
             }
         };
         Ok(&self.0[at].1)
+    }
+
+    /// A frame's particles, which are not kept for another time.
+    pub fn alone(&self, plan: &Plan, picture: &Picture, frame: usize) -> Result<(ParticleFile, usize), ReadError> {
+        match self.0.iter().find(|(f, _)| *f == frame) {
+            Some((_, found)) => Ok(found.clone()),
+            None => Scene::read(picture, Some(&plan.frames.all()[frame].file)),
+        }
     }
 
     /// The particles of a moment.
@@ -84,13 +95,15 @@ impl Read {
     }
 }
 
-fn load(plan: &Plan, exposure: &Exposure, read: &mut Read) -> Result<Ready, Box<dyn Error>> {
+fn load(plan: &Plan, exposure: &Exposure, read: &mut Read, memory: &mut Memory) -> Result<Ready, Box<dyn Error>> {
     let picture = &exposure.picture;
     let begin = Instant::now();
-    let particles = read.moment(plan, picture, &exposure.moment)?;
+    let mut particles = read.moment(plan, picture, &exposure.moment)?;
     let read_ms = ms_since(begin);
     let begin = Instant::now();
     let file = plan.frames.all()[exposure.moment.frame].file.as_path();
+    let held = memory.held(plan, exposure, &particles, read).map_err(|e| format!("{}: {e}", file.display()))?;
+    particles.0.classes = held.classes.or(particles.0.classes.take());
     let scene = picture.prepared(particles, Some(file), picture.preparer())?;
-    Ok(Ready { scene, read_ms, prepare_ms: ms_since(begin) })
+    Ok(Ready { scene, read_ms, prepare_ms: ms_since(begin), class_changes: held.changes })
 }

@@ -33,6 +33,13 @@ pub struct Moment {
     pub interval: f64,
 }
 
+impl Moment {
+    /// How many frames lie before it.
+    pub fn before(&self) -> usize {
+        self.frame + usize::from(self.toward > 0.0)
+    }
+}
+
 /// When pictures are taken.
 pub struct Times<'a> {
     frames: &'a Frames,

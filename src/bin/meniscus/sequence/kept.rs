@@ -6,7 +6,7 @@ use meniscus::io::{Budget, images};
 use std::{fs, path::Path, time::UNIX_EPOCH};
 
 /// What a picture is of: everything that decides it but the device. Files count by name, length and time of writing.
-pub fn label(exposures: &[Exposure], frames: &Frames) -> String {
+pub fn label(exposures: &[Exposure], frames: &Frames, memory: usize) -> String {
     let mut hash = blake3::Hasher::new();
     let mut add = |bytes: &[u8]| {
         hash.update(&(bytes.len() as u64).to_le_bytes());
@@ -24,6 +24,12 @@ pub fn label(exposures: &[Exposure], frames: &Frames) -> String {
             add(identity(&frames.all()[moment.frame + 1].file).as_bytes());
             add(&moment.toward.to_le_bytes());
             add(&moment.interval.to_le_bytes());
+        }
+        if let Some(upper) = exposure.picture.keep_class_below.filter(|_| memory > 0) {
+            add(&upper.to_le_bytes());
+            for frame in moment.before().saturating_sub(memory)..moment.before() {
+                add(identity(&frames.all()[frame].file).as_bytes());
+            }
         }
     }
     hash.finalize().to_hex().to_string()

@@ -45,6 +45,10 @@ pub struct Plan {
     /// Whether pictures are taken between frames.
     pub between: bool,
     pub shots: Vec<Shot>,
+    /// How many frames before a picture's decide its classes.
+    pub memory: usize,
+    /// Whether changes of classes are counted.
+    pub counts: bool,
     /// Made anew, of all pictures.
     pub films: Vec<(PathBuf, Kind)>,
     /// Where rows go.
@@ -97,6 +101,7 @@ impl Plan {
         if args.options.time.is_some() {
             return Err("--time is one moment, and a sequence has many: leave it out".into());
         }
+        let memory = args.memory.unwrap_or(0) as usize;
         let scene_file = args.options.scene_file()?;
         let base = |time| scene_file.as_ref().map_or_else(|| Ok(Picture::default()), |file| file.at(time));
         let cameras = RefCell::new(Cameras::default());
@@ -107,6 +112,9 @@ impl Plan {
             }
             let mut picture = args.options.over_seen(base, None, Some(frame), &mut cameras.borrow_mut())?;
             args.compositing.apply(&mut picture);
+            // A tenth above the threshold is plenty.
+            let upper = args.keep_class_below.map_or(1.1 * picture.preparation.splash_threshold, |u| u as f32);
+            picture.keep_class_below = (memory > 0).then_some(upper);
             picture.prepare.get_or_insert(Prepare::Cpu);
             Ok(picture)
         };
@@ -136,6 +144,9 @@ impl Plan {
 
         let picture = at(0.0, frames.number(0, 0.0))?;
         others.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
+        if memory > 0 && picture.preparer().on_device() {
+            return Err("--memory keeps classes that the CPU finds: leave it out, or use --prepare cpu".into());
+        }
         compositing::check(&picture, args.output.iter().map(PathBuf::as_path))?;
         if let Some(film) = args.output.iter().find(|p| Kind::of(p).is_some() && picture.background == Background::None)
         {
@@ -159,7 +170,7 @@ impl Plan {
             };
             let exposures = exposed.iter().map(expose).collect::<Result<Vec<_>, _>>()?;
             let number = *number;
-            let label = kept::label(&exposures, &frames);
+            let label = kept::label(&exposures, &frames, memory);
             let files = patterns.iter().map(|p| p.name(number)).collect();
             shots.push(Shot { number, exposures, files, label, kept: false });
         }
@@ -170,7 +181,8 @@ impl Plan {
         if args.part.is_some() {
             films.clear();
         }
-        Ok(Plan { frames, between: args.step.is_some(), shots, films, stats: table::path(args) })
+        let (between, stats) = (args.step.is_some(), table::path(args));
+        Ok(Plan { frames, between, shots, memory, counts: args.stats.is_some(), films, stats })
     }
 
     /// The first picture's name, and the last one's; and films.

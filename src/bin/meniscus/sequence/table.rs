@@ -34,6 +34,8 @@ pub struct Row {
     pub encode_ms: f64,
     /// Mean difference from the last picture's colours, of 1.
     pub change: Option<f64>,
+    /// Particles whose class is another than in the frame before.
+    class_changes: Option<usize>,
     /// Why it shows no liquid, if it shows none.
     pub note: Option<String>,
 }
@@ -52,7 +54,8 @@ const HEADER: [&str; 12] = [
     "gpu_ms",
     "encode_ms",
 ];
-const CHANGE: &str = "change";
+/// From the picture before, and from the frame before.
+const CHANGES: [&str; 2] = ["change", "class_changes"];
 
 impl Row {
     pub fn new(shot: &Shot) -> Row {
@@ -64,6 +67,7 @@ impl Row {
         (self.splash, self.body, self.dropped) = (report.splash, report.body, scene.dropped);
         self.read_ms += ready.read_ms;
         self.prepare_ms += ready.prepare_ms;
+        self.class_changes = ready.class_changes;
     }
 
     fn cells(&self, file: String) -> Vec<String> {
@@ -74,6 +78,7 @@ impl Row {
         cells.extend(counts.into_iter().chain(times));
         cells.extend([self.gpu_ms.map_or(String::new(), ms), ms(self.encode_ms)]);
         cells.push(change_cell(self.change));
+        cells.push(self.class_changes.map_or(String::new(), |c| c.to_string()));
         cells
     }
 }
@@ -103,12 +108,12 @@ impl<'a> Table<'a> {
 
     /// Whether the row of a picture that is there does not say what has changed since the one before: a part's first.
     pub fn lacks_change(&self, shot: &Shot) -> bool {
-        self.rows.get(&shot.number).and_then(|row| row.last()).is_some_and(String::is_empty)
+        self.rows.get(&shot.number).and_then(|row| row.get(HEADER.len())).is_some_and(String::is_empty)
     }
 
     /// Says so now.
     pub fn set_change(&mut self, shot: &Shot, change: Option<f64>) {
-        if let Some(cell) = self.rows.get_mut(&shot.number).and_then(|row| row.last_mut()) {
+        if let Some(cell) = self.rows.get_mut(&shot.number).and_then(|row| row.get_mut(HEADER.len())) {
             *cell = change_cell(change);
         }
     }
@@ -128,7 +133,7 @@ impl<'a> Table<'a> {
 
     pub fn write(&mut self) -> Result<(), OutputError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        let header: Vec<_> = HEADER.iter().chain([&CHANGE]).map(|h| (*h).to_owned()).collect();
+        let header: Vec<_> = HEADER.iter().chain(&CHANGES).map(|h| (*h).to_owned()).collect();
         // Into memory, rows of one length: nothing can fail.
         for row in [&header].into_iter().chain(self.rows.values()) {
             writer.write_record(row).expect("rows of one length");
@@ -171,7 +176,7 @@ pub fn has_parts(path: &Path) -> bool {
 fn older(path: &Path) -> Option<BTreeMap<u64, Vec<String>>> {
     let mut reader = csv::Reader::from_path(path).ok().filter(|_| path.is_file())?;
     let header = reader.headers().ok()?.clone();
-    if header.iter().ne(HEADER.into_iter().chain([CHANGE])) {
+    if header.iter().ne(HEADER.into_iter().chain(CHANGES)) {
         return None;
     }
     let row = |r: csv::StringRecord| Some((r.get(0)?.parse().ok()?, r.iter().map(str::to_owned).collect()));
