@@ -9,7 +9,8 @@ use ash::vk;
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct SurfaceOutput {
-    /// Its view, of one sample; as large as the output, and the view begins in it where it does in that; of a format with stencil of both aspects or of depth alone.
+    /// Its view, of one sample; as large as the output, and the view begins in it where it does in that. Of a format with stencil it
+    /// is of both aspects or of depth alone.
     pub view: vk::ImageView,
     /// Format of the view.
     pub format: vk::Format,
