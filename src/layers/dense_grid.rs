@@ -44,7 +44,7 @@ parameters! {
     }
 }
 
-/// What sprites add to. Half as wide a float rounds with every particle: docs/methods.md says what that came to.
+/// What sprites add to. Half as wide a float rounds with every particle: docs/methods.md says by how much.
 const FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// What its passes count: nodes along each axis that the body reaches and the grid has not.

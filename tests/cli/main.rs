@@ -62,6 +62,12 @@ impl Run {
     fn prepared(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_meniscus"));
         command.args(args).current_dir(self.folder.path()).env("TMPDIR", self.temporary.path());
+        // Drivers named from the package are there for a program that runs elsewhere, too.
+        if let Some(drivers) = std::env::var_os("VK_ADD_DRIVER_FILES") {
+            let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+            let named: Vec<_> = std::env::split_paths(&drivers).map(|file| package.join(file)).collect();
+            command.env("VK_ADD_DRIVER_FILES", std::env::join_paths(named).expect("they were joined before"));
+        }
         command
     }
 

@@ -131,6 +131,31 @@ fn a_slurm_array_makes_it() {
     });
 }
 
+/// A sweep in parts, and joined.
+#[cfg(all(unix, feature = "study"))]
+#[test]
+fn a_sweep_is_submitted_too() {
+    let run = Run::new();
+    let stress =
+        |folder: &'static str| ["stress", "-o", folder, "--small", "--methods", "field", "--only", "neighbours,sheet"];
+    made_or_broken(&run.command(&stress("whole")));
+    let said =
+        made(&run.command(&[&["submit", "--engine", "slurm", "-o", "job", "--"][..], &stress("parts")].concat()));
+    assert!(said.contains("2 parts of 2 sweeps"), "{said}");
+    for task in ["1", "0"] {
+        ran(Command::new("sh").arg("parts.sh").current_dir(run.path("job")).env("SLURM_ARRAY_TASK_ID", task));
+        assert!(!run.path("parts/stress.csv").exists());
+    }
+    made_or_broken(&Command::new("sh").arg("join.sh").current_dir(run.path("job")).output().expect("it starts"));
+    let table = |folder: &str| fs::read_to_string(run.path(folder).join("stress.csv")).expect("a table");
+    assert_eq!(table("parts"), table("whole"));
+}
+
+/// A case that is not promised may fail.
+fn made_or_broken(output: &Output) {
+    assert!(matches!(output.status.code(), Some(0 | 1)), "{}", text(output));
+}
+
 #[cfg(unix)]
 #[test]
 fn a_hyperqueue_job_makes_it() {
@@ -190,7 +215,8 @@ fn what_cannot_be_submitted_is_refused() {
         assert!(!output.status.success(), "{submit:?}");
         assert!(says.iter().all(|s| text(&output).contains(s)), "{submit:?}: {}", text(&output));
     };
-    refused("slurm", &[], &["info"], &["only a sequence", "info"]);
+    refused("slurm", &[], &["info"], &["sequence, chart, stress", "info"]);
+    refused("slurm", &[], &["stress", "-o", "s", "--part", "0/2"], &["--part", "leave it out"]);
     refused("slurm", &[], &["sequence", "f/*.csv"], &["--output"]);
     refused("slurm", &[], &sequence("film.gif", &[]), &["numbered pictures"]);
     refused("slurm", &[], &sequence("out/#.png", &["--part", "0/2"]), &["--part", "leave it out"]);

@@ -293,15 +293,11 @@ fn check(args: &Args, pictures: &[PathBuf], inputs: &[outputs::Named]) -> Result
     Ok(outputs::check_pictures(pictures, &named)?)
 }
 
-/// How much there is to make.
-pub struct Pictures {
-    pub count: usize,
-    /// Outputs that are numbered pictures.
-    pub patterns: usize,
-}
-
-pub fn pictures(args: &Args) -> Result<Pictures, Box<dyn Error>> {
+/// How many pictures there are to make; an error if there are films alone, whose parts are nothing.
+pub fn count(args: &Args) -> Result<usize, Box<dyn Error>> {
     let plan = Plan::new(args)?;
-    let patterns = args.output.iter().filter(|p| Kind::of(p).is_none()).count();
-    Ok(Pictures { count: plan.shots.len(), patterns })
+    if args.output.iter().all(|p| Kind::of(p).is_some()) {
+        return Err(plan::NO_PICTURES.into());
+    }
+    Ok(plan.shots.len())
 }

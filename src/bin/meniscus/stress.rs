@@ -73,13 +73,25 @@ impl Run {
     }
 }
 
-pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
+type Unit = (&'static Case, &'static str, Settings);
+
+/// What is asked for: cases, methods, and the units that they make, each what one method makes of one case.
+fn asked(args: &Args) -> (Vec<&'static Case>, Vec<(&'static str, Settings)>, Vec<Unit>) {
     let methods = PRESETS.iter().filter(|p| args.methods.is_empty() || args.methods.iter().any(|m| m == p.name));
     let methods: Vec<_> = methods.map(|p| (p.name, Settings::from(p.method()))).collect();
     let cases: Vec<_> =
         CASES.iter().filter(|c| args.only.is_empty() || args.only.iter().any(|o| o == c.name)).collect();
-    // A unit is what one method makes of one case.
-    let all: Vec<_> = cases.iter().flat_map(|case| methods.iter().map(move |(m, s)| (*case, *m, *s))).collect();
+    let all = cases.iter().flat_map(|case| methods.iter().map(move |(m, s)| (*case, *m, *s))).collect();
+    (cases, methods, all)
+}
+
+/// Into how many units it falls.
+pub fn count(args: &Args) -> usize {
+    asked(args).2.len()
+}
+
+pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
+    let (cases, methods, all) = asked(args);
     let names: Vec<_> = all.iter().map(|(case, method, _)| format!("{}/{method}", case.name)).collect();
     if args.units.listed(&names)? {
         return Ok(ExitCode::SUCCESS);
@@ -133,12 +145,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
 }
 
 /// All that these units find, which are run if they are not there.
-fn sweep(
-    session: &mut Session,
-    units: &[(&'static Case, &'static str, Settings)],
-    extent: Extent,
-    store: &Store,
-) -> Result<Vec<Run>, Box<dyn Error>> {
+fn sweep(session: &mut Session, units: &[Unit], extent: Extent, store: &Store) -> Result<Vec<Run>, Box<dyn Error>> {
     let bar = progress(units.len() as u64, "sweeps");
     let mut rig = Rig::new(session);
     let mut runs = Vec::new();

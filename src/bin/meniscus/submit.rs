@@ -1,10 +1,12 @@
-//! `meniscus submit`: what a scheduler of others needs to make a sequence in parts at once. There is none of our own.
+//! `meniscus submit`: what a scheduler of others needs to make a sequence or a sweep in parts at once. There is none of our own.
 
 mod hyperqueue;
 mod openjd;
 mod slurm;
 
 use crate::{Cli, Command, outputs, sequence, terminal};
+#[cfg(feature = "study")]
+use crate::{chart, stress};
 use clap::{Parser, ValueEnum};
 use std::{
     env,
@@ -23,7 +25,7 @@ pub struct Args {
     /// Folder for the job's files: submit.sh hands them over, and passes on what it is given (./submit.sh --partition=gpu)
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Parts, each a task of its own; if not given, one for each eight pictures, and a thousand at most
+    /// Parts, each a task of its own; if not given, one for eight pictures, or one for each unit of a sweep, and a thousand at most
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub tasks: Option<u32>,
     /// Where the program lies on the nodes; where this one does if not given
@@ -32,7 +34,8 @@ pub struct Args {
     /// Hand it over at once
     #[arg(long)]
     pub run: bool,
-    /// The command: sequence 'frames/*.vtk' -o 'out/####.png' ... Its files are named from this folder, which nodes have to see
+    /// The command: sequence 'frames/*.vtk' -o 'out/####.png' ..., chart ..., stress ... Its files are named from this folder, which
+    /// nodes have to see
     #[arg(last = true, required = true, value_name = "COMMAND")]
     pub command: Vec<String>,
 }
@@ -73,9 +76,10 @@ struct Engined {
 #[derive(Debug, thiserror::Error)]
 enum SubmitError {
     #[error(
-        "only a sequence can be submitted: meniscus submit ... -- sequence 'frames/*.vtk' -o 'out/####.png', not \"{0}\""
+        "what falls into parts can be submitted: sequence, chart, stress, such as meniscus submit ... -- sequence 'frames/*.vtk' -o \
+         'out/####.png', not \"{0}\""
     )]
-    NotASequence(String),
+    NoParts(String),
     #[error("--part is what each task is given: leave it out")]
     Part,
     #[error("{0} is not text that a script can name: move it")]
@@ -89,20 +93,20 @@ enum SubmitError {
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let first = args.command.first().map(String::as_str).unwrap_or_default();
     let parsed = Cli::try_parse_from([&"meniscus".to_owned()].into_iter().chain(&args.command));
-    let sequence = match parsed {
-        Ok(Cli { command: Command::Sequence(sequence) }) => sequence,
-        Ok(_) => return Err(SubmitError::NotASequence(terminal::plain(first)).into()),
-        // What is wrong with it is said as if it had been called.
-        Err(e) => e.exit(),
+    // What is wrong with it is said as if it had been called.
+    let command = parsed.unwrap_or_else(|e| e.exit()).command;
+    let (part, count, what, each) = match command {
+        Command::Sequence(sequence) => (sequence.part, sequence::count(&sequence)?, "pictures", 8),
+        #[cfg(feature = "study")]
+        Command::Chart(chart) => (chart.units.part, chart::count(&chart)?, "scenes", 1),
+        #[cfg(feature = "study")]
+        Command::Stress(stress) => (stress.units.part, stress::count(&stress), "sweeps", 1),
+        _ => return Err(SubmitError::NoParts(terminal::plain(first)).into()),
     };
-    if sequence.part.is_some() {
+    if part.is_some() {
         return Err(SubmitError::Part.into());
     }
-    let pictures = sequence::pictures(&sequence)?;
-    if pictures.patterns == 0 {
-        return Err("parts of a film are numbered pictures: name them too, such as --output 'out/####.png'".into());
-    }
-    let tasks = args.tasks.unwrap_or(pictures.count.div_ceil(8).clamp(1, 1000) as u32).min(pictures.count as u32);
+    let tasks = args.tasks.unwrap_or(count.div_ceil(each).clamp(1, 1000) as u32).min(count as u32);
 
     outputs::folder(&args.output)?;
     let text = |path: &Path| path.to_str().map(str::to_owned).ok_or_else(|| SubmitError::NotText(path.to_owned()));
@@ -123,11 +127,11 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
         outputs::write(&args.output.join(name), contents.as_bytes())?;
     }
     let script = args.output.join("submit.sh");
-    let head = format!("#!/bin/sh\n# Hands over {tasks} parts of {} pictures.\nset -e\n", pictures.count);
+    let head = format!("#!/bin/sh\n# Hands over {tasks} parts of {count} {what}.\nset -e\n");
     let contents = format!("{head}cd -- {}\n{}\n", quoted(&job.place), engined.submit);
     outputs::write(&script, contents.as_bytes())?;
     executable(&script)?;
-    terminal::progress(format!("wrote {}: {tasks} parts of {} pictures", script.display(), pictures.count));
+    terminal::progress(format!("wrote {}: {tasks} parts of {count} {what}", script.display()));
     if !args.run {
         return Ok(ExitCode::SUCCESS);
     }

@@ -3,6 +3,7 @@
 //! whoever joins makes what is not there.
 
 use crate::{
+    part::Part,
     sequence::frames::Selection,
     terminal::{self, NotWritten},
 };
@@ -16,6 +17,9 @@ pub struct Units {
     /// is there is joined, and the rest is done
     #[arg(long, value_name = "A-B|NAME")]
     units: Option<String>,
+    /// The same of the K-th of N parts of the units, such as 0/10 to 9/10: what `submit` has its tasks do
+    #[arg(long, value_name = "K/N", conflicts_with_all = ["units", "list_units"])]
+    pub part: Option<Part>,
 }
 
 /// Why there are no such units.
@@ -38,6 +42,9 @@ impl Units {
 
     /// Which of the units are to be done, if not all; counted from 0.
     pub fn some(&self, names: &[String]) -> Result<Option<Vec<usize>>, UnitsError> {
+        if let Some(part) = self.part {
+            return Ok(Some(part.range(names.len()).collect()));
+        }
         let Some(wanted) = &self.units else { return Ok(None) };
         if let Some(named) = names.iter().position(|n| n == wanted) {
             return Ok(Some(vec![named]));

@@ -20,6 +20,8 @@ use meniscus::io::images;
 use rayon::prelude::*;
 use std::{cell::RefCell, error::Error, path::PathBuf};
 
+pub const NO_PICTURES: &str = "parts of a film are numbered pictures: name them too, such as --output 'out/####.png'";
+
 /// One picture of the sequence.
 pub struct Shot {
     pub number: u64,
@@ -126,7 +128,7 @@ impl Plan {
         let frames = Frames::find(inputs)?;
         let patterns = patterns(args)?;
         if args.part.is_some() && patterns.is_empty() {
-            return Err("parts of a film are numbered pictures: name them too, such as --output 'out/####.png'".into());
+            return Err(NO_PICTURES.into());
         }
         let times = Times::new(args, &frames);
         let pictures = times.pictures();
