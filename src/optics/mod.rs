@@ -26,9 +26,9 @@ family! {
     /// How light goes through the liquid's surfaces.
     pub enum Optics: Shading {
         Four(four) = "four",
-        Many(many) = "many",
         Two(two) = "two",
         One(one) = "one",
+        Many(many) = "many",
         Ssfr(ssfr) = "ssfr",
         SsfrIndex(ssfr_index) = "ssfr-index",
         InstantLiquids(instant_liquids) = "instant-liquids",

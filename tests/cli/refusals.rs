@@ -67,7 +67,7 @@ fn bad_parameters_are_refused() {
         &["--smooth", "none", "--window", "7"],
         &["window is 7", "smooth none", "leave --window out", "--smooth plane-fit"],
     );
-    refuse(1, &["--optics", "one", "--internal-reflections", "2"], &["--optics four or --optics many or --optics two"]);
+    refuse(1, &["--optics", "one", "--internal-reflections", "2"], &["--optics four or --optics two"]);
     let traced = ["surfaces that the view does not show", "trace_reflections", "split", "use field"];
     refuse(1, &["--method", "imai16", "--trace-reflections", "2"], &traced);
     refuse(1, &["--trace-reflections", "17"], &["trace_reflections", "0 to 16"]);
