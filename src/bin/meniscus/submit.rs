@@ -11,7 +11,6 @@ use clap::{Parser, ValueEnum};
 use std::{
     env,
     error::Error,
-    ffi::OsString,
     fs,
     path::{Path, PathBuf},
     process::{self, ExitCode},
@@ -168,7 +167,7 @@ fn line(words: &[String]) -> String {
 }
 
 fn found(program: &str) -> bool {
-    let folders = env::var_os("PATH").unwrap_or_else(OsString::new);
+    let folders = env::var_os("PATH").unwrap_or_default();
     env::split_paths(&folders).any(|folder| folder.join(program).is_file())
 }
 
