@@ -5,7 +5,7 @@ use crate::{
     field_walk, half,
     host::{SIZE, ball, case},
     support::{Case, Driver, camera, each_driver, imai16, random_cloud},
-    surface::{BEFORE, floats, has, image},
+    surface::{BEFORE, can_be_in, floats, has, image},
 };
 use ash::vk::{Format, Handle, ImageLayout as Layout, ImageView};
 use glam::Vec3;
@@ -234,7 +234,8 @@ fn scenes_of_each_depth_in_each_pair_of_layouts() {
             }
             let color_only = format == Format::R32_SFLOAT;
             let mut of_format: Option<Vec<u8>> = None;
-            for of_depth in if color_only { &COLORS[..] } else { &DEPTHS } {
+            let of_depths = if color_only { &COLORS[..] } else { &DEPTHS };
+            for of_depth in of_depths.iter().filter(|l| can_be_in(format, **l)) {
                 for of_color in COLORS {
                     let label = format!("{}: {format:?} in {of_depth:?}, colour in {of_color:?}", driver.name);
                     let (color, depth) = (Canvas::new(gpu, FLOAT4, 16, SIZE), Canvas::new(gpu, format, texel, SIZE));
