@@ -10,7 +10,8 @@ use crate::{
 };
 use ash::vk;
 pub use motion::{Before, DeviceVectors, Motion, MovingParticles};
-pub(crate) use surface::{COLOR_LAYOUTS, Says, has_depth, is_halved};
+use surface::{COLOR_LAYOUTS, check_attached};
+pub(crate) use surface::{Says, has_depth, is_halved};
 pub use surface::{SurfaceOutput, SurfaceOutputs};
 
 /// What a frame shows where no liquid is, and what rays bring back that meet neither liquid nor scene.
@@ -170,10 +171,7 @@ impl<'a> FrameInput<'a> {
         if self.output == vk::ImageView::null() {
             return Err(Error::parameter("output", "null", "give the view that is to be drawn into"));
         }
-        if !COLOR_LAYOUTS.contains(&self.output_layout) {
-            let remedy = format!("bring it into one in which it can be attached: {COLOR_LAYOUTS:?}");
-            return Err(Error::parameter("layout of the output", format!("{:?}", self.output_layout), remedy));
-        }
+        check_attached("layout of the output", self.output_layout, COLOR_LAYOUTS)?;
         if let Some(e) = &self.environment {
             check_sampled("environment", e.view, e.layout, SAMPLED)?;
         }

@@ -274,12 +274,8 @@ impl Renderer {
             // The device finds the box; what is written here never shows.
             (bounds, space) = ((Vec3::ZERO, Vec3::ZERO), Space::new(p.radius, Vec3::ZERO));
             if p.count > 0 {
-                let bound = |buffer, offset, stride, bytes| {
-                    let begin = offset % BINDING_ALIGNMENT;
-                    (buffer, offset - begin, begin + stride * u64::from(p.count - 1) + bytes)
-                };
-                positions = bound(p.buffer, p.offset, p.stride, 12);
-                ids = p.ids.map_or(ids, |ids| bound(ids.buffer, ids.offset, ids.stride, 4));
+                positions = bound(p.buffer, p.offset, p.stride, 12, p.count);
+                ids = p.ids.map_or(ids, |ids| bound(ids.buffer, ids.offset, ids.stride, 4, p.count));
             }
         }
         self.check_speeds(&scene)?;
@@ -472,3 +468,9 @@ const FARTHEST_EYE: f32 = 1e12;
 
 /// No device asks for more alignment of a storage buffer's offset.
 pub(crate) const BINDING_ALIGNMENT: u64 = 256;
+
+/// What is bound of a host's buffer that has so many bytes for each of one or more particles: from where on, and how much.
+pub(crate) fn bound(buffer: vk::Buffer, offset: u64, stride: u64, bytes: u64, count: u32) -> (vk::Buffer, u64, u64) {
+    let begin = offset % BINDING_ALIGNMENT;
+    (buffer, offset - begin, begin + stride * u64::from(count - 1) + bytes)
+}

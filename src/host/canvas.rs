@@ -160,15 +160,12 @@ impl<'a> Canvas<'a> {
 
     /// The same as RGB, of four floats a pixel.
     pub fn picture(&self) -> Result<Vec<[f32; 3]>, HostError> {
-        Ok(self.layers()?.0)
+        Ok(self.read()?.chunks_exact(16).map(|p| pixel(p).0).collect())
     }
 
     /// The same as RGB, and alpha apart from it.
     pub fn layers(&self) -> Result<(Vec<[f32; 3]>, Vec<f32>), HostError> {
-        let float = |at: &[u8]| f32::from_ne_bytes([at[0], at[1], at[2], at[3]]);
-        let bytes = self.read()?;
-        let pixels = bytes.chunks_exact(16);
-        Ok(pixels.map(|p| ([float(p), float(&p[4..]), float(&p[8..])], float(&p[12..]))).unzip())
+        Ok(self.read()?.chunks_exact(16).map(pixel).unzip())
     }
 }
 
@@ -183,4 +180,10 @@ impl Drop for Canvas<'_> {
             self.gpu.free(allocation);
         }
     }
+}
+
+/// Light and alpha of four floats.
+fn pixel(bytes: &[u8]) -> ([f32; 3], f32) {
+    let float = |i: usize| f32::from_ne_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]);
+    ([float(0), float(4), float(8)], float(12))
 }

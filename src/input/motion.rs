@@ -5,7 +5,7 @@ use crate::{
     Camera, Error,
     frame::{Moves, Scene},
     prepare::Words,
-    renderer::BINDING_ALIGNMENT,
+    renderer::{BINDING_ALIGNMENT, bound},
     shader::{Motions, Moving},
 };
 use ash::vk;
@@ -70,12 +70,11 @@ impl DeviceVectors {
         DeviceVectors { offset, stride, ..self }
     }
 
-    /// What is bound of the buffer: from where on, and how much; it begins so many words later.
     fn bound(&self, count: u32) -> (vk::Buffer, u64, u64) {
-        let begin = self.offset % BINDING_ALIGNMENT;
-        (self.buffer, self.offset - begin, begin + self.stride * u64::from(count - 1) + 12)
+        bound(self.buffer, self.offset, self.stride, 12, count)
     }
 
+    /// So many words after what is bound begins.
     fn first_word(&self) -> u32 {
         (self.offset % BINDING_ALIGNMENT / 4) as u32
     }

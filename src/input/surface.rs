@@ -102,10 +102,7 @@ impl SurfaceOutputs {
                 return Err(Error::parameter(format, format!("{:?}", output.format), says.remedy()));
             }
             let legal = if has_depth(output.format) { DEPTH_LAYOUTS } else { COLOR_LAYOUTS };
-            if !legal.contains(&output.layout) {
-                let remedy = format!("bring it into one in which it can be attached: {legal:?}");
-                return Err(Error::parameter(layout, format!("{:?}", output.layout), remedy));
-            }
+            check_attached(layout, output.layout, legal)?;
         }
         if self.reactive.is_some() && !(0.0..=1.0).contains(&self.reactive_value) {
             return Err(Error::parameter("reactive value", self.reactive_value, "use 0 to 1"));
@@ -159,8 +156,8 @@ impl Says {
 /// Whether a format has depth.
 pub(crate) fn has_depth(format: vk::Format) -> bool {
     use vk::Format as F;
-    let with_stencil = [F::D16_UNORM_S8_UINT, F::D24_UNORM_S8_UINT, F::D32_SFLOAT_S8_UINT];
-    [F::D16_UNORM, F::X8_D24_UNORM_PACK32, F::D32_SFLOAT].contains(&format) || with_stencil.contains(&format)
+    let with_stencil = matches!(format, F::D16_UNORM_S8_UINT | F::D24_UNORM_S8_UINT | F::D32_SFLOAT_S8_UINT);
+    with_stencil || matches!(format, F::D16_UNORM | F::X8_D24_UNORM_PACK32 | F::D32_SFLOAT)
 }
 
 /// Whether a format holds vectors as (n + 1) / 2.
@@ -184,8 +181,21 @@ const VECTORS: &[vk::Format] = &[
 ];
 const MASKS: &[vk::Format] = &[vk::Format::R8_UNORM, vk::Format::R16_SFLOAT, vk::Format::R32_SFLOAT];
 
+/// Refuses a layout in which an image cannot be attached.
+pub(super) fn check_attached(
+    what: &'static str,
+    layout: vk::ImageLayout,
+    legal: &[vk::ImageLayout],
+) -> Result<(), Error> {
+    if legal.contains(&layout) {
+        return Ok(());
+    }
+    let remedy = format!("bring it into one in which it can be attached: {legal:?}");
+    Err(Error::parameter(what, format!("{layout:?}"), remedy))
+}
+
 /// Layouts in which an image can be a colour attachment.
-pub(crate) const COLOR_LAYOUTS: &[vk::ImageLayout] =
+pub(super) const COLOR_LAYOUTS: &[vk::ImageLayout] =
     &[vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, vk::ImageLayout::ATTACHMENT_OPTIMAL, vk::ImageLayout::GENERAL];
 /// Layouts in which its depth can be attached and written.
 const DEPTH_LAYOUTS: &[vk::ImageLayout] = &[

@@ -137,7 +137,7 @@ pub(crate) struct Ledger {
 impl Ledger {
     /// The file's own bytes are held already.
     pub(crate) fn new(budget: Budget, file: u64) -> Result<Ledger, OverBudget> {
-        let ledger = Ledger { budget, file, held: Cell::new(0), unpacked: Cell::new(0) };
+        let ledger = Ledger::of_parts(budget, file);
         ledger.hold(file, "the file")?;
         Ok(ledger)
     }

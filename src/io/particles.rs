@@ -277,14 +277,12 @@ pub fn describe(path: &Path, budget: &Budget) -> Result<(ParticleFile, Contents)
 
 /// `above` are the collections that name the file.
 fn read_noting(path: &Path, budget: &Budget, notes: &Notes, above: &[PathBuf]) -> Result<ParticleFile, ReadError> {
-    if let Err(error) = reader(path) {
-        return Err(match path.metadata() {
-            Ok(metadata) if metadata.is_dir() => ReadError::IsDirectory { path: path.into() },
-            Err(source) if source.kind() == ErrorKind::NotFound => ReadError::NotFound { path: path.into() },
-            _ => error,
-        });
-    }
-    if let Some(Reader::Parts(read)) = reader(path)?
+    let reader = reader(path).map_err(|error| match path.metadata() {
+        Ok(metadata) if metadata.is_dir() => ReadError::IsDirectory { path: path.into() },
+        Err(source) if source.kind() == ErrorKind::NotFound => ReadError::NotFound { path: path.into() },
+        _ => error,
+    })?;
+    if let Some(Reader::Parts(read)) = reader
         && let Some((file, size)) = regular(path)
     {
         let ledger = Ledger::of_parts(*budget, size);
@@ -297,9 +295,11 @@ fn read_noting(path: &Path, budget: &Budget, notes: &Notes, above: &[PathBuf]) -
 
 /// A file that has a length and so can be read in parts; what goes wrong here is said where it is read whole.
 fn regular(path: &Path) -> Option<(File, u64)> {
+    // A pipe is opened once, where it is read whole: who writes to it would be cut off.
+    path.metadata().ok().filter(|metadata| metadata.is_file())?;
     let file = File::open(path).ok()?;
-    let metadata = file.metadata().ok()?;
-    (metadata.is_file() && metadata.len() > 0).then_some((file, metadata.len()))
+    let size = file.metadata().ok()?.len();
+    (size > 0).then_some((file, size))
 }
 
 /// A file's content.

@@ -8,7 +8,8 @@ use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::paramete
 
 walk_parameters! {
     /// Up to four refractions, through two volumes of liquid (Imai16 §4.4), with total internal reflection.
-    pub struct Four
+    pub struct Four,
+    refractions: |_| 4
 }
 
 impl Shading for Four {
@@ -18,12 +19,5 @@ impl Shading for Four {
 
     fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
         Walk::from(*self).record(plan, scene, surfaces);
-    }
-}
-
-impl From<Four> for Walk {
-    fn from(p: Four) -> Walk {
-        let Four { internal_reflections, fresnel, trace_reflections } = p;
-        Walk { refractions: 4, internal_reflections, fresnel, trace_reflections }
     }
 }

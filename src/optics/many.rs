@@ -11,7 +11,8 @@ walk_parameters! {
     pub struct Many {
         /// Volumes of liquid that a ray goes through at most; it is refracted twice in each
         volumes: u32 = 8, "", "1 to 32" => |n| (1..=32).contains(n);
-    }
+    },
+    refractions: |p| 2 * p.volumes
 }
 
 impl Shading for Many {
@@ -21,12 +22,5 @@ impl Shading for Many {
 
     fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
         Walk::from(*self).record(plan, scene, surfaces);
-    }
-}
-
-impl From<Many> for Walk {
-    fn from(p: Many) -> Walk {
-        let Many { volumes, internal_reflections, fresnel, trace_reflections } = p;
-        Walk { refractions: 2 * volumes, internal_reflections, fresnel, trace_reflections }
     }
 }

@@ -8,7 +8,8 @@ use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::paramete
 
 walk_parameters! {
     /// Up to two refractions, through one volume of liquid (Imai14), with total internal reflection.
-    pub struct Two
+    pub struct Two,
+    refractions: |_| 2
 }
 
 impl Shading for Two {
@@ -18,12 +19,5 @@ impl Shading for Two {
 
     fn record(&self, plan: &mut Plan, scene: &Scene, surfaces: &Surfaces) {
         Walk::from(*self).record(plan, scene, surfaces);
-    }
-}
-
-impl From<Two> for Walk {
-    fn from(p: Two) -> Walk {
-        let Two { internal_reflections, fresnel, trace_reflections } = p;
-        Walk { refractions: 2, internal_reflections, fresnel, trace_reflections }
     }
 }

@@ -14,9 +14,9 @@ use crate::{
 };
 use ash::vk::Format;
 
-/// The parameters of walks that follow light inside the liquid.
+/// A walk that follows light inside the liquid: its parameters, and at how many surfaces they have it bend.
 macro_rules! walk_parameters {
-    ($(#[doc = $about:literal])+ pub struct $Name:ident $({ $($own:tt)* })?) => {
+    ($(#[doc = $about:literal])+ pub struct $Name:ident $({ $($own:tt)* })?, refractions: $refractions:expr) => {
         parameters! {
             $(#[doc = $about])+
             pub struct $Name {
@@ -28,6 +28,18 @@ macro_rules! walk_parameters {
                 /// Reflected rays a pixel that are followed, which may meet the liquid again; the others bring back what is infinitely
                 /// far away. In a density field alone
                 trace_reflections: u32 = 0, "", "0 to 16" => |n| *n <= 16;
+            }
+        }
+
+        impl From<$Name> for Walk {
+            fn from(p: $Name) -> Walk {
+                let refractions: fn(&$Name) -> u32 = $refractions;
+                Walk {
+                    refractions: refractions(&p),
+                    internal_reflections: p.internal_reflections,
+                    fresnel: p.fresnel,
+                    trace_reflections: p.trace_reflections,
+                }
             }
         }
     };

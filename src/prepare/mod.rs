@@ -32,7 +32,7 @@ pub use device::{DeviceIds, DevicePositions};
 pub use neighbours::Search;
 pub use options::{Fit, Options};
 pub use points::points;
-pub use spacing::{estimate_radius, spacing};
+pub use spacing::{estimate_radius, radius_of_spacing, spacing};
 
 use crate::{
     particles::{Class, Ellipsoid, Particles},

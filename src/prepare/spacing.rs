@@ -14,7 +14,12 @@ const COMPRESSION: f32 = 0.9;
 /// A guess, good to about 7 % on simulated liquid (too large by 11 % on an undisturbed lattice):
 /// a radius from the simulation is always better.
 pub fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
-    spacing(positions).map(|median| 0.5 * median / COMPRESSION)
+    spacing(positions).map(radius_of_spacing)
+}
+
+/// The radius that a median nearest-neighbour distance tells: see [`estimate_radius`].
+pub fn radius_of_spacing(median: f32) -> f32 {
+    0.5 * median / COMPRESSION
 }
 
 /// The median nearest-neighbour distance of the distinct finite positions; `None` where fewer than two are distinct.

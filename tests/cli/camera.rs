@@ -29,7 +29,7 @@ class Scene:
         return Some(matrix_world=rows, data=lens)
 
 context = Some(scene=Scene(), evaluated_depsgraph_get=lambda: "graph")
-data = Some(filepath="/tmp/scene.blend")
+data = Some(filepath="scene.blend")
 "#;
 
 /// Runs the script that docs/blender.md shows, in a Blender that is made up.

@@ -2,8 +2,7 @@
 
 use crate::{
     Run,
-    sequence::{GIVEN, frames},
-    text,
+    sequence::{GIVEN, frames, made},
 };
 use exr::prelude::*;
 use glam::DVec3;
@@ -11,12 +10,6 @@ use std::{collections::BTreeMap, fs};
 
 const SIZE: [usize; 2] = [96, 72];
 const SMALL: &[&str] = &["--size", "96x72"];
-
-fn made(run: &Run, args: &[&str]) -> String {
-    let output = run.command(args);
-    assert!(output.status.success(), "{args:?}: {}", text(&output));
-    text(&output)
-}
 
 fn render(run: &Run, file: &str, output: &str, more: &[&str]) {
     made(run, &[&["render", file, "-o", output], SMALL, GIVEN, more].concat());

@@ -23,13 +23,13 @@ fn sequence<'a>(more: &[&'a str]) -> Vec<&'a str> {
     [&["sequence", "f/*.csv", "-o", "out/###.png"], SMALL, GIVEN, more].concat()
 }
 
-fn made(run: &Run, args: &[&str]) -> String {
+pub fn made(run: &Run, args: &[&str]) -> String {
     let output = run.command(args);
     assert!(output.status.success(), "{args:?}: {}", text(&output));
     text(&output)
 }
 
-fn rows(run: &Run, name: &str) -> Vec<Vec<String>> {
+pub fn rows(run: &Run, name: &str) -> Vec<Vec<String>> {
     let content = fs::read_to_string(run.path(name)).expect("a table");
     content.lines().skip(1).map(|l| l.split(',').map(str::to_owned).collect()).collect()
 }

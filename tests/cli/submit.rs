@@ -3,7 +3,7 @@
 
 use crate::{
     Run, listing,
-    sequence::{GIVEN, frames},
+    sequence::{GIVEN, frames, rows},
     text,
 };
 use serde_json::Value;
@@ -23,11 +23,6 @@ fn sequence<'a>(folder: &'a str, more: &[&'a str]) -> Vec<&'a str> {
 fn made(output: &Output) -> String {
     assert!(output.status.success(), "{}", text(output));
     text(output)
-}
-
-fn rows(run: &Run, name: &str) -> Vec<Vec<String>> {
-    let content = fs::read_to_string(run.path(name)).expect("a table");
-    content.lines().skip(1).map(|l| l.split(',').map(str::to_owned).collect()).collect()
 }
 
 fn same(run: &Run, a: &str, b: &str) {

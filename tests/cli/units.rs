@@ -1,15 +1,9 @@
 //! Sweeps in units: listed, done apart, joined.
 
-use crate::{Run, block, listing, text};
+use crate::{Run, block, listing, sequence::made};
 use std::{collections::BTreeMap, fs, process::Stdio, time::SystemTime};
 
 const SWEEP: &[&str] = &["stress", "--small", "--only", "sheet,shuffled", "--methods", "cords08,green10"];
-
-fn made(run: &Run, args: &[&str]) -> String {
-    let output = run.command(args);
-    assert!(output.status.success(), "{args:?}: {}", text(&output));
-    text(&output)
-}
 
 /// Two programs at once on units of their own, and a join, are what one program makes in one go.
 #[test]

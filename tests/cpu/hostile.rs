@@ -11,11 +11,11 @@ use glam::DVec3;
 use meniscus::io::Budget;
 use meniscus::io::particles::{At, ParticleFile, ReadError, read, read_bytes, read_within};
 
-fn corpus(name: &str) -> PathBuf {
+pub(super) fn corpus(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(name)
 }
 
-fn bytes(name: &str, content: impl AsRef<[u8]>) -> Result<ParticleFile, ReadError> {
+pub(super) fn bytes(name: &str, content: impl AsRef<[u8]>) -> Result<ParticleFile, ReadError> {
     read_bytes(Path::new(name), content.as_ref(), &Budget::default())
 }
 

@@ -1,17 +1,9 @@
 //! LAMMPS dumps: as LAMMPS writes them, and as its manual says.
 
+use super::hostile::{bytes, corpus};
 use glam::DVec3;
 use meniscus::io::Budget;
-use meniscus::io::particles::{ParticleFile, ReadError, describe, read, read_bytes};
-use std::path::{Path, PathBuf};
-
-fn corpus(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(name)
-}
-
-fn bytes(name: &str, content: impl AsRef<[u8]>) -> Result<ParticleFile, ReadError> {
-    read_bytes(Path::new(name), content.as_ref(), &Budget::default())
-}
+use meniscus::io::particles::{describe, read};
 
 /// Position and velocity of the first atom at the last time step.
 const FIRST: [f64; 6] = [2.63641968, 0.593666274, 2.67080076, -2.69525491, 2.58175291, -7.06461285];

@@ -1,13 +1,9 @@
 //! Tables as simulators write them, and ids in every format that has a place for them.
 
+use super::hostile::bytes;
 use glam::DVec3;
 use meniscus::io::Budget;
-use meniscus::io::particles::{ParticleFile, ReadError, describe, read_bytes};
-use std::path::Path;
-
-fn bytes(name: &str, content: impl AsRef<[u8]>) -> Result<ParticleFile, ReadError> {
-    read_bytes(Path::new(name), content.as_ref(), &Budget::default())
-}
+use meniscus::io::particles::{ParticleFile, describe};
 
 /// As `JOutputCsv::SaveCsv` of DualSPHysics writes it: lines of its caller's, names with units, and a separator behind each value.
 fn dualsphysics(separator: char) -> String {

@@ -254,13 +254,13 @@ impl CameraFile {
     /// The camera at a frame, between frames on the way, before and after them as in the first and the last; or where it is
     /// without any.
     fn pose(&self, frame: Option<f64>) -> Option<Pose> {
-        let (first, last) = (self.frames.first(), self.frames.last());
+        let first = self.frames.first();
         let Some(frame) = frame.filter(|_| first.is_some()) else { return self.still.or(first.map(|f| f.1)) };
         let next = self.frames.partition_point(|(number, _)| *number <= frame);
         match (next.checked_sub(1).map(|i| &self.frames[i]), self.frames.get(next)) {
             (Some((a, from)), Some((b, to))) if *a < frame => Some(from.toward(to, (frame - a) / (b - a))),
             (Some((_, pose)), _) => Some(*pose),
-            (None, _) => first.or(last).map(|f| f.1),
+            (None, _) => first.map(|f| f.1),
         }
     }
 

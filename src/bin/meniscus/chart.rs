@@ -112,19 +112,15 @@ pub fn unbeaten(points: &[(String, Point)]) -> Vec<usize> {
     front(&points.iter().map(|(_, p)| (times(p)[0], p.liquid.flip)).collect::<Vec<_>>())
 }
 
-fn names(scenes: &[(String, Picture)]) -> Vec<String> {
-    scenes.iter().map(|(name, _)| name.clone()).collect()
-}
-
 /// Into how many units it falls.
 pub fn count(args: &Args) -> Result<usize, Box<dyn Error>> {
-    Ok(names(&args.pictures()?).len())
+    Ok(args.pictures()?.len())
 }
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let scenes = args.pictures()?;
     // A unit is a scene: its ways are measured in turns.
-    let names = names(&scenes);
+    let names: Vec<_> = scenes.iter().map(|(name, _)| name.clone()).collect();
     if args.units.listed(&names)? {
         return Ok(ExitCode::SUCCESS);
     }

@@ -113,8 +113,10 @@ pub struct Pixels {
 impl Pixels {
     /// What the last frame drew.
     pub fn read(session: &mut Session, picture: &Picture, radius: f32) -> Result<Pixels, HostError> {
-        let (rgb, alpha) = session.layers()?;
-        let alpha = (picture.background == Background::None).then_some(alpha);
+        let (rgb, alpha) = match picture.background {
+            Background::Environment => (session.picture()?, None),
+            Background::None => session.layers().map(|(rgb, alpha)| (rgb, Some(alpha)))?,
+        };
         let surface = match picture.channels.0.is_empty() {
             true => None,
             false => Some(Surface::read(session, radius, rgb.len())?),

@@ -282,7 +282,7 @@ pub fn local(positions: &[DVec3]) -> (DVec3, Vec<Vec3>) {
 }
 
 /// Zero, or the middle of a cloud that lies so far out that single precision would coarsen it.
-pub fn origin(positions: &[DVec3]) -> DVec3 {
+fn origin(positions: &[DVec3]) -> DVec3 {
     let Some((low, high)) = positions.iter().map(|p| (*p, *p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
         return DVec3::ZERO;
     };
@@ -300,9 +300,16 @@ pub fn one_bar() {
 /// The radius where none is given: the file's or, where it has none, what positions tell; and which of them it is.
 pub fn own_radius(file: Option<f64>, positions: &[Vec3]) -> Option<(f64, &'static str)> {
     match file {
-        Some(r) => Some((r, "file")),
         None if positions.is_empty() => Some((1.0, "no particles")),
-        None => prepare::estimate_radius(positions).map(|r| (f64::from(r), "estimated from spacing")),
+        _ => told_radius(file, || prepare::spacing(positions)),
+    }
+}
+
+/// The file's radius or, where it has none, what the spacing of particles tells; and which of them it is.
+pub fn told_radius(file: Option<f64>, spacing: impl FnOnce() -> Option<f32>) -> Option<(f64, &'static str)> {
+    match file {
+        Some(r) => Some((r, "file")),
+        None => spacing().map(|s| (f64::from(prepare::radius_of_spacing(s)), "estimated from spacing")),
     }
 }
 

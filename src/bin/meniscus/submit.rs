@@ -147,8 +147,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
 impl Job {
     /// A part's command, the part being what the engine calls it.
     fn part(&self, part: &str) -> Vec<String> {
-        let own = [self.program.clone()].into_iter().chain(self.command.iter().cloned());
-        own.chain(["--part".to_owned(), format!("{part}/{}", self.tasks)]).collect()
+        self.join().into_iter().chain(["--part".to_owned(), format!("{part}/{}", self.tasks)]).collect()
     }
 
     /// What comes after all parts: makes what is not there, joins tables, and makes films.

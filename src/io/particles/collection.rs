@@ -67,8 +67,7 @@ fn members(source: &Source<'_>) -> Result<Vec<Member>, ReadError> {
             Ok(time) if time.is_finite() => Ok(time),
             _ => Err(source.malformed(at, format!("`timestep` is `{}`, and no time", quote(&time)))),
         });
-        let more: Vec<u8> = source.room((size_of::<Member>() + 4 * file.len()) as u64, "names of files")?;
-        drop(more);
+        source.hold(1, size_of::<Member>() + 4 * file.len(), "names of files")?;
         members.push(Member { file: folder.join(file), time: time.transpose()? });
     }
     if members.is_empty() {
@@ -79,11 +78,14 @@ fn members(source: &Source<'_>) -> Result<Vec<Member>, ReadError> {
 
 /// The times of a collection of several, in order, each with its files.
 fn steps(members: &[Member]) -> Vec<(f64, Vec<&Path>)> {
-    let mut times: Vec<f64> = members.iter().filter_map(|member| member.time).collect();
-    times.sort_by(f64::total_cmp);
-    times.dedup();
-    let of = |time: f64| members.iter().filter(move |m| m.time == Some(time)).map(|m| m.file.as_path()).collect();
-    times.into_iter().map(|time| (time, of(time))).collect()
+    let mut timed: Vec<(f64, &Path)> = members.iter().filter_map(|m| Some((m.time?, m.file.as_path()))).collect();
+    // Stable: files of one time stay in their order. -0 and 0 are one time, and none is no number.
+    timed.sort_by(|a, b| a.0.partial_cmp(&b.0).unwrap_or(std::cmp::Ordering::Equal));
+    timed.chunk_by(|a, b| a.0 == b.0).map(|same| (same[0].0, same.iter().map(|(_, file)| *file).collect())).collect()
+}
+
+fn wrong(path: &Path, detail: String, remedy: &'static str) -> ReadError {
+    ReadError::Malformed { path: path.into(), at: At::Unknown, detail, remedy }
 }
 
 /// Reads what a collection of one time names, and joins it. `above` are the collections that name this one.
@@ -95,7 +97,7 @@ pub(super) fn read(
     above: &[PathBuf],
 ) -> Result<ParticleFile, ReadError> {
     let members = guarded(path, bytes, budget, notes, members)?;
-    let wrong = |detail: String, remedy| ReadError::Malformed { path: path.into(), at: At::Unknown, detail, remedy };
+    let wrong = |detail: String, remedy| wrong(path, detail, remedy);
     let steps = steps(&members);
     if let [(first, _), .., (last, _)] = steps[..] {
         let (count, first, last) = (steps.len(), first, last);
@@ -176,12 +178,9 @@ impl Joined<'_> {
                 let (with, without) =
                     if has.is_some() { ("others have", "has none") } else { ("it has", "others have none") };
                 let name = quote(&self.member.to_string_lossy());
-                return Err(ReadError::Malformed {
-                    path: self.path.into(),
-                    at: At::Unknown,
-                    detail: format!("`{name}` and others cannot be joined: of `{array}` {with} one, and {without}"),
-                    remedy: "give all of them the same arrays, or name those that belong together",
-                });
+                let detail = format!("`{name}` and others cannot be joined: of `{array}` {with} one, and {without}");
+                let remedy = "give all of them the same arrays, or name those that belong together";
+                return Err(wrong(self.path, detail, remedy));
             }
         }
         Ok(())
@@ -197,12 +196,10 @@ pub fn time_steps(path: &Path, budget: &Budget) -> Result<Vec<(f64, PathBuf)>, R
     let members = guarded(path, &bytes, budget, &Notes::default(), members)?;
     let one = |(time, files): (f64, Vec<&Path>)| match files[..] {
         [file] => Ok((time, file.to_owned())),
-        _ => Err(ReadError::Malformed {
-            path: path.into(),
-            at: At::Unknown,
-            detail: format!("the time {time} has {} files", files.len()),
-            remedy: "write a .pvtu or .vtm for each time, and name those",
-        }),
+        _ => {
+            let detail = format!("the time {time} has {} files", files.len());
+            Err(wrong(path, detail, "write a .pvtu or .vtm for each time, and name those"))
+        }
     };
     steps(&members).into_iter().map(one).collect()
 }

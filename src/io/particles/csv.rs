@@ -10,7 +10,15 @@ use crate::io::quote::{list, quote};
 
 /// Lines that may come before the names of columns.
 const PREFACE: usize = 16;
-const DELIMITERS: [u8; 3] = [b'\t', b';', b','];
+
+/// A comma may be part of a number where another separator is there, not the other way round.
+fn delimiter(line: &[u8]) -> u8 {
+    [b'\t', b';'].into_iter().find(|d| line.contains(d)).unwrap_or(b',')
+}
+
+fn is_comment(line: &[u8]) -> bool {
+    line.is_empty() || line.starts_with(b"#")
+}
 
 /// Reads columns separated by tabs, semicolons or commas, found by the header's names, before which may be lines about the
 /// whole; without a header the first three.
@@ -19,9 +27,8 @@ pub(super) fn read(source: &Source<'_>) -> Result<ParticleFile, ReadError> {
     let preface = Preface::of(whole);
     let content = &whole[preface.length..];
     let mut lines = text::lines(content).map(|(_, line)| line);
-    let first_line = lines.find(|line| !line.is_empty() && !line.starts_with(b"#")).unwrap_or_default();
-    // A comma may be part of a number where another separator is there, not the other way round.
-    let delimiter = DELIMITERS.into_iter().find(|d| first_line.contains(d)).unwrap_or(b',');
+    let first_line = lines.find(|line| !is_comment(line)).unwrap_or_default();
+    let delimiter = delimiter(first_line);
     let mut reader = ReaderBuilder::new()
         .has_headers(false)
         .delimiter(delimiter)
@@ -111,10 +118,10 @@ impl Preface {
         let mut before: Vec<Vec<String>> = Vec::new();
         for (number, line) in text::lines(content).take(PREFACE) {
             let text = String::from_utf8_lossy(line);
-            let delimiter = DELIMITERS.into_iter().find(|d| line.contains(d)).unwrap_or(b',');
+            let delimiter = delimiter(line);
             let names: Vec<String> = text.split(char::from(delimiter)).map(|name| name.trim().to_owned()).collect();
             let numbers = names.len() >= 3 && names[..3].iter().all(|name| name.parse::<f64>().is_ok());
-            let comment = line.is_empty() || line.starts_with(b"#");
+            let comment = is_comment(line);
             if before.is_empty() && numbers && !comment {
                 break;
             }

@@ -126,9 +126,14 @@ impl Source<'_> {
         ReadError::WrongShape { path: self.path.into(), array: quote::quote(array), found, expected }
     }
 
+    /// Counts `count` values of `each` bytes that are to be allocated elsewhere.
+    pub(super) fn hold(&self, count: u64, each: usize, what: &str) -> Result<(), ReadError> {
+        self.ledger.hold_all(count, each, what).map_err(|over| self.too_large(over))
+    }
+
     /// An empty list with room for `count` values, which are counted before they are allocated.
     pub(super) fn room<T>(&self, count: u64, what: &str) -> Result<Vec<T>, ReadError> {
-        self.ledger.hold_all(count, size_of::<T>(), what).map_err(|over| self.too_large(over))?;
+        self.hold(count, size_of::<T>(), what)?;
         Ok(Vec::with_capacity(count as usize))
     }
 

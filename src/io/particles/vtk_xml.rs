@@ -240,8 +240,7 @@ impl Pieces {
 
     fn ghosts(&mut self, source: &Source<'_>, array: &Array<'_>, encoding: &Encoding<'_>) -> Result<(), ReadError> {
         let (from, to) = (self.before, self.before.saturating_add(self.points));
-        let more: Vec<bool> = source.room(to.saturating_sub(self.ghosts.len()) as u64, "ghosts")?;
-        drop(more);
+        source.hold(to.saturating_sub(self.ghosts.len()) as u64, size_of::<bool>(), "ghosts")?;
         self.ghosts.resize(to, false);
         let mut each = self.ghosts[from..].iter_mut();
         array.values(source, encoding, |v| each.next().into_iter().for_each(|ghost| *ghost = v as u8 & GHOST != 0))

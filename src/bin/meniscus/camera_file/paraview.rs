@@ -58,11 +58,8 @@ fn properties(bytes: &[u8]) -> Result<HashMap<String, Vec<f64>>, quick_xml::Erro
 }
 
 fn attribute(tag: &BytesStart, name: &str) -> Result<Option<String>, quick_xml::Error> {
-    for attribute in tag.attributes().with_checks(false) {
-        let attribute = attribute?;
-        if attribute.key.as_ref() == name.as_bytes() {
-            return Ok(Some(attribute.unescape_value()?.into_owned()));
-        }
+    match tag.try_get_attribute(name)? {
+        Some(found) => Ok(Some(found.unescape_value()?.into_owned())),
+        None => Ok(None),
     }
-    Ok(None)
 }

@@ -2,10 +2,10 @@
 
 use super::Args;
 use crate::{
-    scene::{origin, own_radius},
+    scene::{local, told_radius},
     terminal::{complain, line},
 };
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use meniscus::{
     io::{
         particles::{Contents, Invalid, ParticleFile, ReadError, check_finite, describe},
@@ -80,17 +80,17 @@ fn of(path: &Path, args: &Args) -> Result<Found, ReadError> {
         let (low, high) = positions.iter().fold((*first, *first), |(low, high), p| (low.min(*p), high.max(*p)));
         [low, high].map(|corner| corner.to_array())
     });
-    let origin = origin(&positions);
-    let relative: Vec<Vec3> = positions.iter().map(|p| (*p - origin).as_vec3()).collect();
+    let (_, relative) = local(&positions);
     drop(positions); // twice as large as what was made of them
-    let radius = own_radius(file.radius, &relative).filter(|_| !relative.is_empty());
+    let spacing = prepare::spacing(&relative);
+    let radius = told_radius(file.radius, || spacing).filter(|_| !relative.is_empty());
     let Contents { format, compression, time, step, steps, files, arrays } = contents;
     Ok(Found {
         file: quote::path(path),
         particles: count + not_finite,
         not_finite,
         bounds,
-        spacing: prepare::spacing(&relative),
+        spacing,
         radius: radius.map(|(r, _)| r),
         radius_source: radius.map(|(_, source)| source),
         support: file.support,

@@ -9,6 +9,7 @@ use super::{
 use crate::{picture::Picture, scene::Scene};
 use meniscus::io::particles::{ParticleFile, ReadError};
 use std::{
+    borrow::Cow,
     error::Error,
     sync::mpsc::{Receiver, sync_channel},
     thread::Scope,
@@ -66,10 +67,15 @@ impl Read {
     }
 
     /// A frame's particles, which are not kept for another time.
-    pub fn alone(&self, plan: &Plan, picture: &Picture, frame: usize) -> Result<(ParticleFile, usize), ReadError> {
+    pub fn alone(
+        &self,
+        plan: &Plan,
+        picture: &Picture,
+        frame: usize,
+    ) -> Result<Cow<'_, (ParticleFile, usize)>, ReadError> {
         match self.0.iter().find(|(f, _)| *f == frame) {
-            Some((_, found)) => Ok(found.clone()),
-            None => Scene::read(picture, Some(&plan.frames.all()[frame].file)),
+            Some((_, found)) => Ok(Cow::Borrowed(found)),
+            None => Scene::read(picture, Some(&plan.frames.all()[frame].file)).map(Cow::Owned),
         }
     }
 

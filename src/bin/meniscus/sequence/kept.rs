@@ -25,7 +25,7 @@ pub fn label(exposures: &[Exposure], frames: &Frames, memory: usize) -> String {
             add(&moment.toward.to_le_bytes());
             add(&moment.interval.to_le_bytes());
         }
-        if let Some(upper) = exposure.picture.keep_class_below.filter(|_| memory > 0) {
+        if let Some(upper) = exposure.picture.keep_class_below {
             add(&upper.to_le_bytes());
             for frame in moment.before().saturating_sub(memory)..moment.before() {
                 add(identity(&frames.all()[frame].file).as_bytes());

@@ -88,8 +88,8 @@ impl Memory {
             return at;
         }
         // One that cannot be read has nothing to say here; its own picture says why.
-        let found = read.alone(plan, picture, frame).ok().filter(|(_, dropped)| *dropped == 0);
-        let densities = found.and_then(|(file, _)| densities_of(picture, &file).ok());
+        let found = read.alone(plan, picture, frame).ok().filter(|found| found.1 == 0);
+        let densities = found.and_then(|found| densities_of(picture, &found.0).ok());
         self.0.push(Known::new(frame, picture, densities));
         self.0.len() - 1
     }

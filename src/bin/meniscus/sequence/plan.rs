@@ -18,7 +18,7 @@ use crate::{
 use glam::{DVec3, Vec3};
 use meniscus::io::images;
 use rayon::prelude::*;
-use std::{cell::RefCell, error::Error, path::PathBuf};
+use std::{error::Error, path::PathBuf};
 
 pub const NO_PICTURES: &str = "parts of a film are numbered pictures: name them too, such as --output 'out/####.png'";
 
@@ -106,13 +106,13 @@ impl Plan {
         let memory = args.memory.unwrap_or(0) as usize;
         let scene_file = args.options.scene_file()?;
         let base = |time| scene_file.as_ref().map_or_else(|| Ok(Picture::default()), |file| file.at(time));
-        let cameras = RefCell::new(Cameras::default());
-        let at = |time, frame| -> Result<Picture, Box<dyn Error>> {
+        let mut cameras = Cameras::default();
+        let mut at = |time, frame| -> Result<Picture, Box<dyn Error>> {
             let base = base(time)?;
             if args.turn.is_some() && base.camera.file.is_some() {
                 return Err("--turn goes around a target, and a camera file has none: leave one of them out".into());
             }
-            let mut picture = args.options.over_seen(base, None, Some(frame), &mut cameras.borrow_mut())?;
+            let mut picture = args.options.over_seen(base, None, Some(frame), &mut cameras)?;
             args.compositing.apply(&mut picture);
             // A tenth above the threshold is plenty.
             let upper = args.keep_class_below.map_or(1.1 * picture.preparation.splash_threshold, |u| u as f32);

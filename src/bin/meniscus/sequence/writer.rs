@@ -127,6 +127,8 @@ impl<'a> Writer<'a> {
         }
         // Where there is alpha, as what is read again: straight bytes are not to the last bit what they were made of.
         let bytes = match (shot.files.first(), encoded.first()) {
+            // Nobody compares or films it.
+            _ if self.table.is_none() && self.films.is_empty() => Vec::new(),
             (Some(file), Some(bytes)) if pixels.has_alpha() => {
                 srgb_bytes(&picture_from_bytes(file, bytes, &picture.max_memory)?.1)
             }
