@@ -9,7 +9,11 @@ layout(local_size_x = PARTICLE_GROUP) in;
 #include "positions.glsl"
 layout(set = 0, binding = 0, std430) buffer FrameBlock { Frame frame; };
 layout(set = 0, binding = 3, std430) buffer CounterBlock { uint at[]; } counters;
+layout(set = 0, binding = 4, std430) readonly buffer CountBlock { uint at[]; } device_count; // or anything, where the host knows
 layout(constant_id = 1) const uint COUNTERS = 0; // slot of its first counter
+
+// How many particles there are.
+uint live() { return min(prepare.count, max(device_count.at[prepare.count_word], prepare.least_count)); }
 
 // Integers in the order of the floats.
 uint ordered(float x) {
@@ -24,7 +28,7 @@ shared uint box[6];
 void main() {
     if (gl_LocalInvocationIndex < 6u) box[gl_LocalInvocationIndex] = gl_LocalInvocationIndex < 3u ? 0xffffffffu : 0u;
     barrier();
-    uint block = group_index(), count = prepare.count, lost = 0u;
+    uint block = group_index(), count = live(), lost = 0u;
     uvec3 least = uvec3(0xffffffffu), most = uvec3(0u);
     for (uint k = 0u; k < BLOCK / PARTICLE_GROUP; ++k) {
         uint i = block * BLOCK + k * PARTICLE_GROUP + gl_LocalInvocationIndex;
@@ -56,6 +60,8 @@ void main() {
         low = vec3(unordered(extent.at[0]), unordered(extent.at[1]), unordered(extent.at[2]));
         high = vec3(unordered(extent.at[3]), unordered(extent.at[4]), unordered(extent.at[5]));
     }
+    uint count = live();
+    extent.at[EXTENT_COUNT] = frame.count = count;
     // The table enters particles into the cells around theirs, too.
     int more = RELATION_TABLE ? 1 : 0;
     uint bits = 0u;
@@ -80,8 +86,8 @@ void main() {
         extent.at[at + 5u] = 1u;
     }
     // The liquid's own space: one particle's position is its origin (src/space.rs).
-    vec3 origin = position(prepare.count / 2u);
-    if (!finite(origin)) origin = 0.5 * low + 0.5 * high;
+    vec3 origin = position(count / 2u);
+    if (count == 0u || !finite(origin)) origin = 0.5 * low + 0.5 * high;
     for (int a = 0; a < 3; ++a) extent.at[EXTENT_ORIGIN + a] = floatBitsToUint(origin[a]);
     float unit = 1.0 / prepare.radius, room = max(prepare.longest_axis, SPLASH_RADIUS);
     frame.view[3].xyz = unit * (mat3(frame.view) * origin + frame.view[3].xyz);

@@ -4,8 +4,10 @@
 #include "shared.glsl"
 #include "frame.glsl"
 layout(constant_id = 0) const bool VELOCITIES = false; // or where particles were
+layout(constant_id = 1) const bool COUNTED = false;    // the device knows how many there are
 layout(set = 0, binding = 1, std430) readonly buffer PositionBlock { float at[]; } positions;
 layout(set = 0, binding = 2, std430) readonly buffer BeforeBlock { float at[]; } before;
+layout(set = 0, binding = 4, std430) readonly buffer CountBlock { uint at[]; } device_count; // with COUNTED
 layout(push_constant) uniform PushBlock { Moving moving; };
 layout(location = 0) flat out vec3 center; // eye space, in particle radii
 layout(location = 1) flat out vec3 moved;  // since the frame before
@@ -21,7 +23,7 @@ vec2 extent(float x, float d) {
 
 void main() {
     uint i = gl_VertexIndex / 6u, k = gl_VertexIndex % 6u;
-    uint p = (moving.first_words & 0xffffu) + i * moving.word_stride, b = (moving.first_words >> 16) + i * moving.before_stride;
+    uint p = (moving.first_words & 0xffu) + i * moving.word_stride, b = (moving.first_words >> 8 & 0xffu) + i * moving.before_stride;
     vec3 now = vec3(positions.at[p], positions.at[p + 1u], positions.at[p + 2u]);
     vec3 then = vec3(before.at[b], before.at[b + 1u], before.at[b + 2u]);
     center = to_eye(vec4(now, 1.0));
@@ -34,7 +36,7 @@ void main() {
     bool around = d <= 1.001 * MOTION_REACH;
     vec2 low = around ? vec2(0.0) : min(a, c) - 1.0, high = around ? frame.size : max(a, c) + 1.0;
     vec2 at = clamp(mix(low, high, corner), vec2(-1.0), frame.size + 1.0);
-    // Not where any of it is no number.
-    bool there = d > -MOTION_REACH && dot(center, center) < 1e30 && dot(moved, moved) < 1e30;
+    // Not where there is none, or any of it is no number.
+    bool there = (!COUNTED || i < device_count.at[moving.first_words >> 16]) && d > -MOTION_REACH && dot(center, center) < 1e30 && dot(moved, moved) < 1e30;
     gl_Position = there ? vec4(2.0 * at / frame.size - 1.0, 0.5, 1.0) : vec4(2.0, 2.0, 0.5, 1.0);
 }

@@ -38,7 +38,6 @@ layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[
 #endif
 layout(constant_id = 1) const uint COUNTERS = 0; // slot of its first counter
 
-uint count() { return prepare.count; }
 vec3 sorted_position(uint k) { return vec3(sorted.at[3u * k], sorted.at[3u * k + 1u], sorted.at[3u * k + 2u]); }
 uint entry_at(uint rank) { // the sort's result
     uint passes = extent.at[EXTENT_PASSES];
@@ -48,7 +47,7 @@ uint input_index(uint k) { return RELATION_TABLE ? k : entry_at(k); }
 
 #ifdef NEIGHBOURS
 // Words of a particle's list: its index, how many neighbours it has, and those of them that there is room for.
-uint list_words() { return neighbours.at.length() / count(); }
+uint list_words() { return neighbours.at.length() / prepare.count; }
 void begin_list(uint k, uint number) {
     neighbours.at[k * list_words()] = input_index(k);
     neighbours.at[k * list_words() + 1u] = number;
@@ -78,12 +77,12 @@ uint search(ivec3 c, bool inclusive, uint low) {
 // The same among keys of one word: first rank, not before `low`, whose key is not smaller than `key`. It is mostly near, so
 // strides grow from there.
 uint search_key(uint key, uint low) {
-    uint keys = free_half(), reach = 8u;
-    while (low + reach < count() && order.at[keys + low + reach] < key) {
+    uint keys = free_half(), count = particles(), reach = 8u;
+    while (low + reach < count && order.at[keys + low + reach] < key) {
         low += reach;
         reach *= 4u;
     }
-    uint high = min(low + reach, count());
+    uint high = min(low + reach, count);
     while (low < high) {
         uint middle = low + (high - low) / 2u;
         if (order.at[keys + middle] < key) low = middle + 1u;
@@ -105,7 +104,7 @@ uvec2 run_of(ivec3 from, ivec3 to, uint low) {
     if (any(lessThan(from.xy, first.xy)) || any(greaterThan(from.xy, last.xy)) || from.z > to.z) return uvec2(low, low);
     uint begin = search_key(sort_key(from).x, low), key = sort_key(to).x;
     // The last key of all has none after it.
-    return uvec2(begin, key == 0xffffffffu ? count() : search_key(key + 1u, begin));
+    return uvec2(begin, key == 0xffffffffu ? particles() : search_key(key + 1u, begin));
 }
 
 // How many candidates of a run one of them stands for: 1 but in a crowd.
@@ -435,7 +434,11 @@ Sums sum_over(Batch b, uint number) {
 
 void main() {
     for (uint c = 0u; c < FATES; ++c) tally[c] = 0u;
-    uint next = min(invocation() * SHAPE_RUN, count()), to = min(next + SHAPE_RUN, count());
+    uint first = invocation() * SHAPE_RUN, next = min(first, particles()), to = min(first + SHAPE_RUN, particles());
+#ifdef POINTS
+    // Those that are not there; who reads points goes through as many as there may be.
+    for (uint k = max(first, to); k < min(first + SHAPE_RUN, prepare.count); ++k) points.at[k] = vec4(0.0);
+#endif
     while (next < to) {
         uint from = next++;
         vec3 x = sorted_position(from);

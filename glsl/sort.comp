@@ -37,7 +37,7 @@ void main() {
     scan_row(gl_WorkGroupID.x, blocks(), DIGITS);
 #elif defined(GATHER)
     uint k = invocation();
-    if (k >= prepare.count) return;
+    if (k >= particles()) return;
     // The relation table is looked up from particles in the order of the input.
     uint i = RELATION_TABLE ? k : entry_at(k, extent.at[EXTENT_PASSES]);
     vec3 x = position(i);

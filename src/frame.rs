@@ -91,8 +91,10 @@ pub(crate) struct Scene<'a> {
     pub settings: &'a Settings,
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Particles.
+    /// Particles that there may be.
     pub count: u32,
+    /// Whether the device knows how many there are.
+    pub counted: bool,
     /// Whether any of them may be splash.
     pub splash: bool,
     /// Whether any of them may belong to the body.
@@ -150,7 +152,10 @@ pub(crate) struct Preparation {
 /// Particles that move, as the pass is told of them.
 #[derive(Clone, Copy)]
 pub(crate) struct Moves {
+    /// That there may be.
     pub count: u32,
+    /// Whether the device knows how many there are.
+    pub counted: bool,
     /// Whether their velocities are known, or where they were.
     pub velocities: bool,
     pub block: shader::Moving,
@@ -172,6 +177,7 @@ impl<'a> Scene<'a> {
             settings,
             size,
             count: (splash + body) as u32,
+            counted: false,
             splash: splash > 0,
             body: body > 0,
             prepare: None,

@@ -36,9 +36,9 @@
 //! * Particles are prepared on the host ([`prepare::prepare`], [`Renderer::set_particles`]; for a density field, which is the
 //!   default, also [`prepare::points`], [`Renderer::set_points`]) or, frame by frame, on the device
 //!   from positions in a buffer of the host's ([`prepare::DevicePositions`]): then no count ever comes back, and what a
-//!   scene does not need is an indirect draw or dispatch of nothing. Such a buffer, and that of ids
-//!   ([`prepare::DeviceIds`]), is the host's: its writes are visible to reads in compute shaders before the frame, which
-//!   only reads it.
+//!   scene does not need is an indirect draw or dispatch of nothing. Such a buffer, and those of ids
+//!   ([`prepare::DeviceIds`]) and of the number of particles, where only the device knows it ([`prepare::DeviceCount`]), are
+//!   the host's: its writes are visible to reads in compute shaders before the frame, which only reads them.
 //! * The same input gives the same bits on the same driver; prepared on the host, in whatever order the particles come.
 //!
 //! # Spaces and units

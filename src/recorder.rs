@@ -21,6 +21,8 @@ pub(crate) struct Externals {
     pub frame_block: vk::Buffer,
     /// Buffer, offset and range of the host's positions.
     pub positions: (vk::Buffer, u64, u64),
+    /// The same of how many they are.
+    pub count: (vk::Buffer, u64, u64),
     /// The same of their ids.
     pub ids: (vk::Buffer, u64, u64),
     /// Centres and shapes, where the host prepared them.
@@ -37,8 +39,8 @@ pub(crate) struct Externals {
     /// Where the view begins in what the host gives to be drawn into.
     pub origin: [u32; 2],
     pub surface: SurfaceOutputs,
-    /// Particles that move, and how: as positions.
-    pub moving: [(vk::Buffer, u64, u64); 2],
+    /// Particles that move, how, and how many they are: as positions.
+    pub moving: [(vk::Buffer, u64, u64); 3],
 }
 
 /// One barrier of a recorded frame.
@@ -350,9 +352,11 @@ impl Recorder<'_> {
                 Ok((self.externals.frame_block, scale.offset(), size_of::<shader::Frame>() as u64))
             }
             Made::Given(External::Positions) => Ok(self.externals.positions),
+            Made::Given(External::Count) => Ok(self.externals.count),
             Made::Given(External::Ids) => Ok(self.externals.ids),
             Made::Given(External::MovingPositions) => Ok(self.externals.moving[0]),
             Made::Given(External::Motions) => Ok(self.externals.moving[1]),
+            Made::Given(External::MovingCount) => Ok(self.externals.moving[2]),
             Made::Given(External::Centers) => all(centers),
             Made::Given(External::Diagonals) => all(diagonals),
             Made::Given(External::Mixed) => all(mixed),

@@ -81,8 +81,9 @@ struct SceneBounds {
 /// Where the particles of a frame come from.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Given {
-    /// On the device: buffer, offset and range of their positions and ids.
+    /// On the device: buffer, offset and range of their positions, of their number and of their ids.
     positions: (vk::Buffer, u64, u64),
+    count: (vk::Buffer, u64, u64),
     ids: (vk::Buffer, u64, u64),
     /// By the host: how often it has given some.
     times: u64,
@@ -241,10 +242,10 @@ impl Renderer {
     /// * `cmd` is recording, outside rendering, and goes to a queue of the family in [`Host`], after all frames
     ///   recorded before it.
     /// * The frame last recorded into `input.slot` has completed on the device.
-    /// * The buffer of [`FrameInput::positions`], and that of their ids if they have any, are alive until the frame has
+    /// * The buffer of [`FrameInput::positions`], and those of their number and of their ids if they have any, are alive until the frame has
     ///   completed, hold what is said of them, have usage `STORAGE_BUFFER`, and their earlier writes are visible to reads
     ///   in compute shaders. What is written there later waits for the frame's compute shaders.
-    /// * The buffers of [`crate::MovingParticles`] are alive until the frame has completed, have usage `STORAGE_BUFFER`, and their earlier
+    /// * The buffers of [`crate::MovingParticles`], that of their number too if they have one, are alive until the frame has completed, have usage `STORAGE_BUFFER`, and their earlier
     ///   writes are visible to reads in vertex shaders.
     /// * The output, and what there is of the scene, of an environment of the host's and of [`FrameInput::surface`], are alive until
     ///   the frame has completed and in the stated layouts; all but the environment have the view in
@@ -268,13 +269,14 @@ impl Renderer {
         };
         let mut bounds = self.scene.bounds;
         let mut space = self.scene.space;
-        let [mut positions, mut ids] = [(vk::Buffer::null(), 0, 0); 2];
+        let [mut positions, mut count, mut ids] = [(vk::Buffer::null(), 0, 0); 3];
         let mut scene = self.scene_of(input)?;
         if let Some(p) = &input.positions {
             // The device finds the box; what is written here never shows.
             (bounds, space) = ((Vec3::ZERO, Vec3::ZERO), Space::new(p.radius, Vec3::ZERO));
             if p.count > 0 {
                 positions = bound(p.buffer, p.offset, p.stride, 12, p.count);
+                count = p.device_count.map_or(count, |c| c.bound());
                 ids = p.ids.map_or(ids, |ids| bound(ids.buffer, ids.offset, ids.stride, 4, p.count));
             }
         }
@@ -308,7 +310,7 @@ impl Renderer {
         check_memory(&self.host, &self.limits, &self.tables, &plan)?;
         self.pipelines.make(&self.host, plan.recipes())?;
 
-        let particles = (plan.work_for_particles(), Given { positions, ids, times: self.given });
+        let particles = (plan.work_for_particles(), Given { positions, count, ids, times: self.given });
         let keep = input.still && self.last_particles == Some(particles) && self.tables[0].fits(&plan, Home::Particles);
         if keep {
             plan.keep_particles();
@@ -353,6 +355,7 @@ impl Renderer {
         let externals = Externals {
             frame_block: slot.frame_block.handle,
             positions,
+            count,
             ids,
             particles: particles.map_or([vk::Buffer::null(); 3], |b| b.each_ref().map(|b| b.handle)),
             speeds: self.speeds.as_ref().map_or(vk::Buffer::null(), |b| b.handle),

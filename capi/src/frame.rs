@@ -14,7 +14,7 @@ use renderer::{
         ImageLayout as VkImageLayout, ImageView as VkImageView,
     },
     glam::Mat4,
-    prepare::{DeviceIds, DevicePositions, Options},
+    prepare::{DeviceCount, DeviceIds, DevicePositions, Options},
 };
 use std::mem::offset_of;
 
@@ -45,7 +45,7 @@ pub struct MeniscusPositions {
     pub offset: VkDeviceSize,
     /// Bytes from one to the next; a multiple of 4, at least 12. 0 stands for 12.
     pub stride: VkDeviceSize,
-    /// How many there are.
+    /// How many there are; with count_buffer how many there may be.
     pub count: u32,
     /// Particle radius in world units: half the rest spacing.
     pub radius: f32,
@@ -61,12 +61,22 @@ pub struct MeniscusPositions {
     pub id_offset: VkDeviceSize,
     /// Bytes from one id to the next; a multiple of 4. 0 stands for 4.
     pub id_stride: VkDeviceSize,
+    /// How many particles there are, where only the device knows: 32 bits, read when the frame runs; or VK_NULL_HANDLE. What lies
+    /// behind so many is not there, whatever it holds. It may be the buffer of the positions.
+    pub count_buffer: VkBuffer,
+    /// Where that number lies, in bytes; a multiple of 4.
+    pub count_offset: VkDeviceSize,
 }
 
 // SAFETY: repr(C); its size first; no padding (a test adds it up); numbers and handles.
 unsafe impl Versioned for MeniscusPositions {
     const NAME: &'static str = "MeniscusPositions";
     const LEAST: usize = offset_of!(MeniscusPositions, keep_class_below);
+}
+
+/// What the renderer takes; null is none.
+fn device_count(buffer: VkBuffer, offset: VkDeviceSize) -> Option<DeviceCount> {
+    (buffer != VkBuffer::null()).then(|| DeviceCount::new(buffer, offset))
 }
 
 impl MeniscusPositions {
@@ -79,6 +89,7 @@ impl MeniscusPositions {
             .options(*options)
             .keep_class_below((self.keep_class_below != 0.0).then_some(self.keep_class_below))
             .ids((self.id_number > 0).then_some(ids))
+            .device_count(device_count(self.count_buffer, self.count_offset))
     }
 }
 
@@ -169,10 +180,14 @@ pub struct MeniscusMotion {
     pub before_offset: VkDeviceSize,
     /// Bytes from one to the next; a multiple of 4, at least 12. 0 stands for 12.
     pub before_stride: VkDeviceSize,
-    /// How many particles; 0: the liquid stands still, and only the camera moves.
+    /// How many particles, with count_buffer how many there may be; 0: the liquid stands still, and only the camera moves.
     pub count: u32,
     /// Seconds since the frame before, that velocities count for; 0 where `before` holds positions.
     pub seconds: f32,
+    /// How many particles there are, where only the device knows: 32 bits; or VK_NULL_HANDLE. Read in vertex shaders.
+    pub count_buffer: VkBuffer,
+    /// Where that number lies, in bytes; a multiple of 4.
+    pub count_offset: VkDeviceSize,
 }
 
 // SAFETY: repr(C); its size first; no padding (a test adds it up); numbers and handles.
@@ -196,8 +211,10 @@ impl MeniscusMotion {
         let matrix = |m: &[f32; 16]| Mat4::from_cols_array(m);
         let output = SurfaceOutput::new(self.output, self.output_format, self.output_layout);
         let previous = (matrix(&self.previous_view), matrix(&self.previous_projection));
-        Motion::new(output, previous, matrix(&self.projection))
-            .particles((self.count > 0).then(|| MovingParticles::new(self.count, positions, before)))
+        Motion::new(output, previous, matrix(&self.projection)).particles((self.count > 0).then(|| {
+            let count = device_count(self.count_buffer, self.count_offset);
+            MovingParticles::new(self.count, positions, before).device_count(count)
+        }))
     }
 }
 

@@ -21,8 +21,10 @@ ivec3 cell_of(vec3 x) {
     return ivec3(cell_of(x.x, prepare.cell_edge), cell_of(x.y, prepare.cell_edge), cell_of(x.z, prepare.cell_edge));
 }
 
+uint particles() { return extent.at[EXTENT_COUNT]; }
+
 // What the sort orders: particles, or entries of the relation table.
-uint entries() { return prepare.count * (RELATION_TABLE ? 27u : 1u); }
+uint entries() { return particles() * (RELATION_TABLE ? 27u : 1u); }
 uint blocks() { return (entries() + BLOCK - 1u) / BLOCK; }
 
 // The order buffer has two halves, and each pass of the sort reads one and writes the other. Where the half begins that a pass

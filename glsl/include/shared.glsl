@@ -83,7 +83,9 @@
 #define EXTENT_DISPATCH 16
 // Origin of the liquid's own space.
 #define EXTENT_ORIGIN 136
-#define EXTENT_WORDS 139
+// How many particles there are: what the device says of it, but no more than the host has room for.
+#define EXTENT_COUNT 139
+#define EXTENT_WORDS 140
 
 // Bits of the key that one pass of the sort orders by.
 #define DIGIT_BITS 5
@@ -229,7 +231,7 @@ struct Draws {
 // Push constants of the preparation. Lengths are world units times a power of two that brings the radius into 1..2: that
 // rounds nothing, and squares of lengths stay within float32 at any scale.
 struct Prepare {
-    uint count;                // particles
+    uint count;                // particles that there may be
     uint first_word;           // where positions begin in their buffer
     uint word_stride;          // words from one position to the next
     uint entries_per_particle; // in the sort: 1, or 27 of the relation table
@@ -252,6 +254,8 @@ struct Prepare {
     uint first_id_word;        // where ids begin in their buffer
     uint id_word_stride;       // words from one id to the next
     uint kept_classes;         // classes that are kept: one for each id, or for each particle
+    uint count_word;           // where the number of particles lies in its buffer
+    uint least_count;          // at least so many there are: all, where the device has no say
 };
 
 // The density field (docs/methods.md, "Density field"). Nodes along an edge of a brick, as a power of two, and in all of it; as many
@@ -382,7 +386,7 @@ struct Moving {
     vec4 eye_x;         // from the world to eye space in particle radii
     vec4 eye_y;
     vec4 eye_z;
-    uint first_words;   // where positions begin in their buffer, and in the upper half where what was before does in its own
+    uint first_words;   // a byte each: where positions begin in their buffer, what was before in its own, and the number in its
     uint word_stride;   // words from one position to the next
     uint before_stride; // and of what was before
     float seconds;      // that velocities count for

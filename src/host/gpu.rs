@@ -12,7 +12,7 @@ use gpu_allocator::{
     vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc},
 };
 use std::{
-    ffi::c_char,
+    ffi::{CStr, c_char},
     sync::{Arc, Mutex},
     time::Instant,
 };
@@ -31,6 +31,13 @@ pub struct Gpu<'a> {
     pub(super) tools: Tools,
 }
 
+/// Whether a device has an extension.
+fn offers(instance: &Instance, info: &DeviceInfo, name: &CStr) -> Result<bool, HostError> {
+    // SAFETY: the physical device is this instance's.
+    let known = unsafe { instance.handle.enumerate_device_extension_properties(info.handle) };
+    Ok(known.map_err(vulkan("device extensions"))?.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
+}
+
 impl<'a> Gpu<'a> {
     /// Makes a device with exactly what meniscus needs.
     pub fn new(instance: &'a Instance, info: DeviceInfo) -> Result<Gpu<'a>, HostError> {
@@ -40,9 +47,7 @@ impl<'a> Gpu<'a> {
     /// A device that also tells what its compiler makes of pipelines: see [`crate::compiler`].
     pub fn telling(instance: &'a Instance, info: DeviceInfo) -> Result<Gpu<'a>, HostError> {
         let name = compiler::EXTENSION;
-        // SAFETY: the physical device is this instance's.
-        let known = unsafe { instance.handle.enumerate_device_extension_properties(info.handle) };
-        if !known.map_err(vulkan("device extensions"))?.iter().any(|e| e.extension_name_as_c_str() == Ok(name)) {
+        if !offers(instance, &info, name)? {
             return Err(compiler::not_told(info.name).into());
         }
         let mut tells =
@@ -63,6 +68,15 @@ impl<'a> Gpu<'a> {
     /// A device that also presents to surfaces.
     pub fn presenting(instance: &'a Instance, info: DeviceInfo) -> Result<Gpu<'a>, HostError> {
         Gpu::with(instance, info, &[ash::khr::swapchain::NAME.as_ptr()], vk::DeviceCreateInfo::default(), false)
+    }
+
+    /// A device that also shares memory with others by file descriptors; none where the driver has no `VK_KHR_external_memory_fd`.
+    pub fn importing(instance: &'a Instance, info: DeviceInfo) -> Result<Option<Gpu<'a>>, HostError> {
+        let name = ash::khr::external_memory_fd::NAME;
+        if !offers(instance, &info, name)? {
+            return Ok(None);
+        }
+        Gpu::with(instance, info, &[name.as_ptr()], vk::DeviceCreateInfo::default(), false).map(Some)
     }
 
     pub(super) fn with(

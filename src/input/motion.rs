@@ -4,7 +4,7 @@ use super::surface::SurfaceOutput;
 use crate::{
     Camera, Error,
     frame::{Moves, Scene},
-    prepare::Words,
+    prepare::{DeviceCount, Words},
     renderer::{BINDING_ALIGNMENT, bound},
     shader::{Motions, Moving},
 };
@@ -102,8 +102,10 @@ pub enum Before {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct MovingParticles {
-    /// How many there are.
+    /// How many there are, or may be.
     pub count: u32,
+    /// How many of them there are, where only the device knows.
+    pub device_count: Option<DeviceCount>,
     /// Where they are, in world units.
     pub positions: DeviceVectors,
     /// And how they came there.
@@ -113,7 +115,13 @@ pub struct MovingParticles {
 impl MovingParticles {
     /// So many particles.
     pub fn new(count: u32, positions: DeviceVectors, before: Before) -> MovingParticles {
-        MovingParticles { count, positions, before }
+        MovingParticles { count, device_count: None, positions, before }
+    }
+
+    /// The same, but only so many of them as the device says.
+    #[must_use]
+    pub fn device_count(self, count: impl Into<Option<DeviceCount>>) -> Self {
+        MovingParticles { device_count: count.into(), ..self }
     }
 
     /// Where they were, or their velocities; and the seconds that these count for.
@@ -132,6 +140,9 @@ impl MovingParticles {
         let positions = ["offset of moving positions", "stride of moving positions"];
         self.positions.check("buffer of moving positions", positions, self.count)?;
         before.check("buffer of motions", ["offset of motions", "stride of motions"], self.count)?;
+        if let Some(count) = self.device_count {
+            count.check(["buffer of the moving count", "offset of the moving count"])?;
+        }
         if let Some(seconds) = seconds.filter(|s| !s.is_finite()) {
             return Err(Error::parameter("seconds of velocities", seconds, "use a finite time"));
         }
@@ -150,8 +161,12 @@ impl Motion {
     }
 
     /// The buffers, and what of them is bound.
-    pub(crate) fn bound(&self) -> [(vk::Buffer, u64, u64); 2] {
-        self.moving().map(|p| [p.positions.bound(p.count), p.vectors().0.bound(p.count)]).unwrap_or_default()
+    pub(crate) fn bound(&self) -> [(vk::Buffer, u64, u64); 3] {
+        let bound = |p: MovingParticles| {
+            let count = p.device_count.map_or_else(Default::default, |c| c.bound());
+            [p.positions.bound(p.count), p.vectors().0.bound(p.count), count]
+        };
+        self.moving().map(bound).unwrap_or_default()
     }
 
     /// Puts it into a scene that this camera sees.
@@ -170,16 +185,17 @@ impl Motion {
         scene.moves = self.moving().map(|p| {
             let eye = DMat4::from_scale(DVec3::splat(radius.recip())) * view;
             let (before, seconds) = p.vectors();
+            let count_word = p.device_count.map_or(0, |c| c.word(BINDING_ALIGNMENT));
             let block = Moving {
                 eye_x: eye.row(0).as_vec4(),
                 eye_y: eye.row(1).as_vec4(),
                 eye_z: eye.row(2).as_vec4(),
-                first_words: p.positions.first_word() | before.first_word() << 16,
+                first_words: p.positions.first_word() | before.first_word() << 8 | count_word << 16,
                 word_stride: (p.positions.stride / 4) as u32,
                 before_stride: (before.stride / 4) as u32,
                 seconds: seconds.unwrap_or_default(),
             };
-            Moves { count: p.count, velocities: seconds.is_some(), block }
+            Moves { count: p.count, counted: p.device_count.is_some(), velocities: seconds.is_some(), block }
         });
     }
 

@@ -13,13 +13,16 @@ use ash::vk;
 pub(crate) fn record(plan: &mut Plan, scene: &Scene, prepare: &Prepare) -> Target {
     let extent = plan.buffer("extent", 4 * u64::from(EXTENT_WORDS));
     let positions = plan.given(External::Positions);
+    // Where the host knows their number nothing comes of what is read there.
+    let number = if scene.counted { plan.given(External::Count) } else { positions };
     let least = 4 * u64::from(EXTENT_MOST);
     plan.fill("extent", extent, 0, least, u32::MAX);
     plan.fill("extent", extent, least, vk::WHOLE_SIZE, 0);
     let reduce = Call::compute(&EXTENT_REDUCE_COMP).counting(&["not_finite"]);
     let relation = prepare.entries_per_particle != 1;
     let dispatch = |plan: &mut Plan, call: Call, groups| {
-        let call = call.read("positions", positions).update("extent", extent).push_all(prepare);
+        let call =
+            call.read("positions", positions).read("device_count", number).update("extent", extent).push_all(prepare);
         plan.dispatch("extent", call, groups);
     };
     dispatch(plan, reduce, per_block(scene.count));

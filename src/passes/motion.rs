@@ -11,11 +11,16 @@ use ash::vk::{CompareOp, Format};
 pub(crate) fn record(plan: &mut Plan, moves: &Moves, first: Target) -> Target {
     let moved = plan.flat("surface motion", Format::R32G32B32A32_SFLOAT);
     let nearest = plan.flat("nearest particle test", Format::D32_SFLOAT);
+    let positions = plan.given(External::MovingPositions);
+    // Where the host knows their number nothing is read there.
+    let number = if moves.counted { plan.given(External::MovingCount) } else { positions };
     let call = Call::draw(&MOTION_VERT, &MOTION_FRAG)
-        .read("positions", plan.given(External::MovingPositions))
+        .read("positions", positions)
+        .read("device_count", number)
         .read("before", plan.given(External::Motions))
         .read("first_surface", first)
         .constant("VELOCITIES", moves.velocities)
+        .constant("COUNTED", moves.counted)
         .push_all(&moves.block);
     let rendering = Rendering::into(moved, 0).testing(nearest, 1.0, CompareOp::LESS);
     // As quads: what is as large as this is mostly larger than points.

@@ -34,7 +34,11 @@ pub(crate) fn record(plan: &mut Plan, scene: &Scene, preparation: &Preparation, 
         // How many of these passes the occupied cells need only the device knows: the others are empty.
         let (blocks, rows) = (4 * u64::from(EXTENT_DISPATCH + 6 * pass), 4 * u64::from(EXTENT_DISPATCH + 6 * pass + 3));
         let count = keys(step(&SORT_COUNT_COMP, &prepare)).read("order", order).update("sums", sums);
-        let scan = step(&SORT_SCAN_COMP, &prepare).update("sums", sums);
+        let relation = preparation.constants.entries_per_particle != 1;
+        let scan = Call::compute(&SORT_SCAN_COMP)
+            .constant("RELATION_TABLE", relation)
+            .read("extent", extent)
+            .update("sums", sums);
         let scatter = keys(step(&SORT_SCATTER_COMP, &prepare)).update("order", order).read("sums", sums);
         for (call, arguments) in [(count, blocks), (scan, rows), (scatter, blocks)] {
             plan.dispatch("sort", call, Groups::Indirect(extent, arguments));

@@ -335,10 +335,11 @@ fn fits(plan: &Plan, b: &Binding, target: Target) -> Result<(), String> {
         (None, Made::Own(Spec::Buffer { .. })) => true,
         (None, Made::Given(given)) if b.kind != Kind::TexelBuffer => {
             use External::{
-                Centers, Diagonals, FrameBlock, Ids, Mixed, Motions, MovingPositions, Points, Positions, Speeds,
+                Centers, Count, Diagonals, FrameBlock, Ids, Mixed, Motions, MovingCount, MovingPositions, Points,
+                Positions, Speeds,
             };
-            let particles = matches!(given, Positions | Ids | Centers | Diagonals | Mixed | Speeds | Points);
-            particles || matches!(given, FrameBlock(_) | MovingPositions | Motions)
+            let particles = matches!(given, Positions | Count | Ids | Centers | Diagonals | Mixed | Speeds | Points);
+            particles || matches!(given, FrameBlock(_) | MovingPositions | MovingCount | Motions)
         }
         _ => false,
     };

@@ -87,6 +87,7 @@ impl Plan {
             External::FrameBlock(Scale::Full) => ("frame block", Home::View),
             External::FrameBlock(Scale::Half) => ("frame block (half)", Home::View),
             External::Positions => ("positions (host's)", Home::Particles),
+            External::Count => ("particle count (host's)", Home::Particles),
             External::Ids => ("ids (host's)", Home::Particles),
             External::Centers => ("particle centres", Home::Particles),
             External::Diagonals => ("particle shapes (diagonal)", Home::Particles),
@@ -103,6 +104,7 @@ impl Plan {
             External::Surface(Says::Motion, _) => ("motion vectors (host's)", Home::View),
             External::Surface(Says::Reactive, _) => ("reactive mask (host's)", Home::View),
             External::MovingPositions => ("moving positions (host's)", Home::View),
+            External::MovingCount => ("moving count (host's)", Home::View),
             External::Motions => ("motions (host's)", Home::View),
         };
         self.resources.push(Declared { name, home, made: Made::Given(external), per_particle: false });

@@ -41,6 +41,8 @@ pub(crate) enum External {
     /// The slot's uniform block for passes at this scale, which the host has just written.
     FrameBlock(Scale),
     Positions,
+    /// How many they are.
+    Count,
     Ids,
     Centers,
     Diagonals,
@@ -56,8 +58,9 @@ pub(crate) enum External {
     Output(vk::Format),
     /// What the host is told of the first surface.
     Surface(Says, vk::Format),
-    /// Particles that move, and how.
+    /// Particles that move, how many they are, and how.
     MovingPositions,
+    MovingCount,
     Motions,
 }
 

@@ -6,7 +6,7 @@ use super::{
     ellipsoids::{flat_offset, lattice_variance},
     options::Scale,
 };
-use crate::{Error, frame::Kept, shader::Prepare, space};
+use crate::{Error, frame::Kept, renderer::bound, shader::Prepare, space};
 use ash::vk;
 
 /// Positions in device memory, to be prepared within the frame that draws them: neighbours, classes and ellipsoids as
@@ -21,8 +21,10 @@ pub struct DevicePositions {
     pub offset: u64,
     /// Bytes from one to the next; a multiple of 4, at least 12.
     pub stride: u64,
-    /// How many there are.
+    /// How many there are; with [`DevicePositions::device_count`] how many there may be.
     pub count: u32,
+    /// How many there are, where only the device knows: a simulation that emits, drains or streams.
+    pub device_count: Option<DeviceCount>,
     /// Particle radius in world units.
     pub radius: f32,
     /// What can be chosen.
@@ -38,6 +40,47 @@ pub struct DevicePositions {
     /// Which particle is which, for [`DevicePositions::keep_class_below`], which alone reads them: needed where the
     /// simulation re-sorts its particles, or their number changes. Without, particles go by their index in the buffer.
     pub ids: Option<DeviceIds>,
+}
+
+/// How many particles there are, in device memory: a word of 32 bits, read when the frame runs. What lies behind so many particles is
+/// not there: it is neither looked at, nor sorted, nor drawn, whatever it holds. More than there may be ([`DevicePositions::count`]) are
+/// as many as that. Memory and dispatches are those of as many as there may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct DeviceCount {
+    /// The host's buffer, with usage `STORAGE_BUFFER`; it may be that of the positions.
+    pub buffer: vk::Buffer,
+    /// Where the number lies, in bytes; a multiple of 4.
+    pub offset: u64,
+}
+
+impl DeviceCount {
+    /// The number at this byte of a buffer.
+    pub fn new(buffer: vk::Buffer, offset: u64) -> DeviceCount {
+        DeviceCount { buffer, offset }
+    }
+
+    /// What of it is bound.
+    pub(crate) fn bound(&self) -> (vk::Buffer, u64, u64) {
+        bound(self.buffer, self.offset, 4, 4, 1)
+    }
+
+    /// Which word of that it is.
+    pub(crate) fn word(&self, alignment: u64) -> u32 {
+        (self.offset % alignment / 4) as u32
+    }
+
+    /// What can be told without using it.
+    pub(crate) fn check(&self, [buffer_of, offset_of]: [&'static str; 2]) -> Result<(), Error> {
+        if self.buffer == vk::Buffer::null() {
+            return Err(Error::parameter(buffer_of, "null", "give the buffer that holds it, or None"));
+        }
+        self.check_offset(offset_of)
+    }
+
+    fn check_offset(&self, offset_of: &'static str) -> Result<(), Error> {
+        Words { offset_of, stride_of: offset_of, offset: self.offset, stride: 4, bytes: 4 }.check(1)
+    }
 }
 
 /// Ids of particles in device memory: one of 32 bits a particle, in the order of the positions.
@@ -104,13 +147,29 @@ impl DevicePositions {
     /// Positions that fill a buffer without gaps, prepared with the default options.
     pub fn packed(buffer: vk::Buffer, count: u32, radius: f32) -> DevicePositions {
         let options = Options::default();
-        DevicePositions { buffer, offset: 0, stride: 12, count, radius, options, keep_class_below: None, ids: None }
+        DevicePositions {
+            buffer,
+            offset: 0,
+            stride: 12,
+            count,
+            device_count: None,
+            radius,
+            options,
+            keep_class_below: None,
+            ids: None,
+        }
     }
 
     /// The same, beginning at a byte of the buffer and lying so many bytes apart.
     #[must_use]
     pub fn laid_out(self, offset: u64, stride: u64) -> Self {
         DevicePositions { offset, stride, ..self }
+    }
+
+    /// The same, but only so many of them as the device says: see [`DevicePositions::device_count`].
+    #[must_use]
+    pub fn device_count(self, count: impl Into<Option<DeviceCount>>) -> Self {
+        DevicePositions { device_count: count.into(), ..self }
     }
 
     /// The same with other options.
@@ -164,6 +223,9 @@ impl DevicePositions {
                 return Err(Error::parameter("number of ids", 0, "use one more than the largest id"));
             }
         }
+        if let Some(count) = self.device_count {
+            count.check_offset("offset of the particle count")?;
+        }
         let keep_below = self.options.fade_from(self.keep_class_below)?;
         // Sorted cells are as wide as the support, those of the relation table as the reach.
         let cell_edge = match self.options.search {
@@ -197,6 +259,8 @@ impl DevicePositions {
             first_id_word: self.ids.map_or(0, |ids| (ids.offset % alignment / 4) as u32),
             id_word_stride: self.ids.map_or(0, |ids| (ids.stride / 4) as u32),
             kept_classes: self.kept().map_or(0, |k| k.number),
+            count_word: self.device_count.map_or(0, |c| c.word(alignment)),
+            least_count: if self.device_count.is_some() { 0 } else { self.count },
         })
     }
 }

@@ -28,7 +28,7 @@ use glam::{DMat3, Mat3, Vec3};
 pub(crate) use density::rest_density;
 pub use density::{DensityField, classes_over, classify, densities};
 pub(crate) use device::Words;
-pub use device::{DeviceIds, DevicePositions};
+pub use device::{DeviceCount, DeviceIds, DevicePositions};
 pub use neighbours::Search;
 pub use options::{Fit, Options};
 pub use points::points;

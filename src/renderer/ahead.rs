@@ -40,6 +40,7 @@ impl Amount<'_> {
             }
             Amount::OnDevice(p) => {
                 scene.count = p.count;
+                scene.counted = p.device_count.is_some();
                 // Only the device will know whether there are particles of each class.
                 (scene.splash, scene.body) = (p.count > 0, p.count > 0);
                 let constants = p.constants(BINDING_ALIGNMENT)?;

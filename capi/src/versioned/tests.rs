@@ -132,11 +132,11 @@ fn layouts_stay() {
     let sizes = [
         (64, ends!(MeniscusHost, debug_utils: u32)),
         (160, ends!(MeniscusCamera, reserved: u32)),
-        (72, ends!(MeniscusPositions, id_stride: u64)),
+        (88, ends!(MeniscusPositions, count_offset: u64)),
         (48, ends!(MeniscusScene, origin: [u32; 2])),
         (24, ends!(MeniscusEnvironment, shape: u32)),
         (72, ends!(MeniscusSurface, reserved: u32)),
-        (272, ends!(MeniscusMotion, seconds: f32)),
+        (288, ends!(MeniscusMotion, count_offset: u64)),
         (96, ends!(MeniscusFrame, reserved: u32)),
         (64, ends!(MeniscusParticles, reserved: u32)),
         (64, ends!(MeniscusReport, splash_axes_ignored: usize)),

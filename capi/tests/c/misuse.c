@@ -383,6 +383,21 @@ static void frames(const Vulkan *vk, MeniscusRenderer *renderer, const MeniscusS
     } later = {f, 0};
     later.known.struct_size = sizeof later;
     draw(vk, cmd, renderer, &later.known, &picture, &readback, pictures[2]);
+    /* As many as the device says, which is what there may be, or fewer. */
+    const uint32_t said[2] = {PARTICLES, 0};
+    const Buffer counted = make_buffer(vk, sizeof said, storage);
+    memcpy(counted.bytes, said, sizeof said);
+    positions.count_buffer = counted.buffer, positions.count_offset = 2;
+    begin(vk, cmd);
+    PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "offset of the particle count is 2");
+    VK(vkEndCommandBuffer(cmd));
+    positions.count_offset = 0;
+    draw(vk, cmd, renderer, &f, &picture, &readback, pictures[3]);
+    TRUE(memcmp(pictures[2], pictures[3], sizeof pictures[0]) == 0);
+    positions.count_offset = 4;
+    draw(vk, cmd, renderer, &f, &picture, &readback, pictures[3]);
+    TRUE(memcmp(pictures[2], pictures[3], sizeof pictures[0]) != 0);
+    positions.count_buffer = VK_NULL_HANDLE;
     positions.keep_class_below = 0.55f, positions.id_number = PARTICLES, positions.id_buffer = strewn.buffer;
     positions.id_offset = 28, positions.id_stride = 32;
     draw(vk, cmd, renderer, &f, &picture, &readback, pictures[3]);
@@ -412,6 +427,7 @@ static void frames(const Vulkan *vk, MeniscusRenderer *renderer, const MeniscusS
     destroy_buffer(vk, &readback);
     destroy_buffer(vk, &packed);
     destroy_buffer(vk, &strewn);
+    destroy_buffer(vk, &counted);
 }
 
 int main(int argc, char **argv) {
