@@ -1,9 +1,8 @@
 //! The host's device, borrowed, and what it has to be able to do.
 
-use crate::Error;
+use crate::{Error, memory::MemoryAllocator};
 use ash::vk;
-use gpu_allocator::vulkan::Allocator;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// What the host lends. Handles are cloned function tables: the host keeps the device alive until the
 /// [`crate::Renderer`] is gone, and destroys it itself.
@@ -18,8 +17,8 @@ pub struct Host {
     pub physical_device: vk::PhysicalDevice,
     /// Family of the queue that the command buffers go to: graphics and compute.
     pub queue_family: u32,
-    /// The host's allocator, shared.
-    pub allocator: Arc<Mutex<Allocator>>,
+    /// The host's allocator, shared: a mutex around `gpu-allocator`'s, or whatever gives device memory.
+    pub allocator: Arc<dyn MemoryAllocator>,
     /// How many calls of [`crate::Renderer::record`] may be waiting for their frames to complete: frames in flight, times
     /// views a frame; 1 to 256.
     pub frames_in_flight: u32,
@@ -39,7 +38,7 @@ impl Host {
         device: ash::Device,
         physical_device: vk::PhysicalDevice,
         queue_family: u32,
-        allocator: Arc<Mutex<Allocator>>,
+        allocator: Arc<dyn MemoryAllocator>,
     ) -> Host {
         Host {
             instance,

@@ -32,7 +32,7 @@ pub enum Error {
         /// Size asked for.
         bytes: u64,
         /// The allocator's reason.
-        source: gpu_allocator::AllocationError,
+        source: crate::memory::Refusal,
     },
     /// More memory than the device has; nothing was allocated.
     #[error(

@@ -6,7 +6,7 @@
 //!
 //! # The contract
 //!
-//! * [`Renderer`] borrows the host's instance, device and allocator ([`Host`]); it creates no device, submits
+//! * [`Renderer`] borrows the host's instance, device and allocator of device memory ([`Host`], [`memory`]); it creates no device, submits
 //!   nothing, waits for nothing and presents nothing. It needs Vulkan 1.3 with `dynamicRendering` and
 //!   `synchronization2` enabled, and one queue family with graphics and compute; see [`device`].
 //! * [`Renderer::record`] records one frame, `src/frame.rs` is that frame from top to bottom.
@@ -67,6 +67,7 @@ pub mod inspect;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod layers;
+pub mod memory;
 pub mod method;
 pub mod optics;
 pub mod parameters;
@@ -103,7 +104,9 @@ pub mod twin;
 pub mod work;
 
 // Of the versions whose types stand in the public interface.
-pub use {ash, glam, gpu_allocator};
+#[cfg(feature = "gpu-allocator")]
+pub use gpu_allocator;
+pub use {ash, glam};
 
 pub use device::Host;
 pub use environment::{Equirect, EquirectBuilder};

@@ -1,11 +1,11 @@
 //! Images and buffers: made, named, retired by frame index and destroyed without waiting.
 
-use crate::{Error, device::Host};
-use ash::vk;
-use gpu_allocator::{
-    MemoryLocation,
-    vulkan::{Allocation, AllocationCreateDesc, AllocationScheme},
+use crate::{
+    Error,
+    device::Host,
+    memory::{Location, Memory, Request},
 };
+use ash::vk;
 
 /// An image with its views: one of the whole, and one a layer for attachments.
 pub(crate) struct Image {
@@ -14,7 +14,7 @@ pub(crate) struct Image {
     pub layers: Vec<vk::ImageView>,
     pub aspect: vk::ImageAspectFlags,
     pub bytes: u64,
-    allocation: Option<Allocation>,
+    allocation: Option<Memory>,
 }
 
 /// A buffer; mapped where it is the host that writes it.
@@ -23,7 +23,7 @@ pub(crate) struct Buffer {
     /// Its view as a texel buffer, four words a texel; null where it is not used as one.
     pub texels: vk::BufferView,
     pub bytes: u64,
-    allocation: Option<Allocation>,
+    allocation: Option<Memory>,
 }
 
 /// How an image is made; also what its memory is computed from.
@@ -61,30 +61,24 @@ fn allocate(
     host: &Host,
     name: &str,
     requirements: vk::MemoryRequirements,
-    location: MemoryLocation,
+    location: Location,
     linear: bool,
-) -> Result<Allocation, Error> {
-    let desc = AllocationCreateDesc {
-        name,
-        requirements,
-        location,
-        linear,
-        allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-    };
-    // A poisoned lock means that the host panicked while it held it; its allocator is still the one to ask.
-    let mut allocator = host.allocator.lock().unwrap_or_else(|e| e.into_inner());
-    allocator.allocate(&desc).map_err(|source| Error::Memory {
-        resource: name.into(),
-        bytes: requirements.size,
-        source,
-    })
+) -> Result<Memory, Error> {
+    let request = Request { name, requirements, location, linear };
+    let (resource, bytes) = (name.to_owned(), requirements.size);
+    let given = host.allocator.allocate(&request).and_then(|memory| match (location, memory.mapped) {
+        (Location::Upload, None) => {
+            host.allocator.free(memory);
+            Err("the allocator gave memory that is not mapped, where the host has to write".into())
+        }
+        _ => Ok(memory),
+    });
+    given.map_err(|source| Error::Memory { resource, bytes, source })
 }
 
-fn free(host: &Host, allocation: &mut Option<Allocation>) {
-    if let Some(allocation) = allocation.take() {
-        let mut allocator = host.allocator.lock().unwrap_or_else(|e| e.into_inner());
-        // It came from this allocator; there is nothing a caller could do about a refusal.
-        let _ = allocator.free(allocation);
+fn free(host: &Host, allocation: &mut Option<Memory>) {
+    if let Some(memory) = allocation.take() {
+        host.allocator.free(memory);
     }
 }
 
@@ -121,9 +115,9 @@ impl Image {
         spec: &ImageSpec,
         requirements: vk::MemoryRequirements,
     ) -> Result<(), Error> {
-        let allocation = allocate(host, name, requirements, MemoryLocation::GpuOnly, false)?;
+        let allocation = allocate(host, name, requirements, Location::Device, false)?;
         // SAFETY: memory of the image's own requirements, bound once, kept until the image is destroyed.
-        let bound = unsafe { host.device.bind_image_memory(self.handle, allocation.memory(), allocation.offset()) };
+        let bound = unsafe { host.device.bind_image_memory(self.handle, allocation.memory, allocation.offset) };
         self.allocation = Some(allocation);
         bound.map_err(Error::vulkan(name))?;
         host.set_name(self.handle, name);
@@ -172,7 +166,7 @@ impl Buffer {
         name: &str,
         bytes: u64,
         usage: vk::BufferUsageFlags,
-        location: MemoryLocation,
+        location: Location,
     ) -> Result<Buffer, Error> {
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage).sharing_mode(vk::SharingMode::EXCLUSIVE);
         // SAFETY: the info is complete and the device alive.
@@ -183,7 +177,7 @@ impl Buffer {
         let mut buffer = Buffer { handle, texels, bytes: requirements.size, allocation: None };
         let bound = allocate(host, name, requirements, location, true).and_then(|allocation| {
             // SAFETY: memory of the buffer's own requirements, bound once, kept until the buffer is destroyed.
-            let bound = unsafe { host.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
+            let bound = unsafe { host.device.bind_buffer_memory(handle, allocation.memory, allocation.offset) };
             buffer.allocation = Some(allocation);
             bound.map_err(Error::vulkan(name))?;
             if usage.contains(vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER) {
@@ -205,7 +199,9 @@ impl Buffer {
 
     /// The mapped memory; empty where the buffer is not the host's to write.
     pub fn mapped(&mut self) -> &mut [u8] {
-        self.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).unwrap_or_default()
+        let Some(first) = self.allocation.as_ref().and_then(|a| a.mapped) else { return &mut [] };
+        // SAFETY: so much is mapped (contract of `MemoryAllocator`) while the allocation is this buffer's, which is borrowed.
+        unsafe { std::slice::from_raw_parts_mut(first.as_ptr(), self.bytes as usize) }
     }
 
     pub fn destroy(&mut self, host: &Host) {

@@ -1,8 +1,7 @@
 //! What belongs to one of the frames in flight.
 
-use crate::{Error, device::Host, plan::Plan, profile::Profiler, resources::Buffer, scale};
+use crate::{Error, device::Host, memory::Location, plan::Plan, profile::Profiler, resources::Buffer, scale};
 use ash::vk;
-use gpu_allocator::MemoryLocation;
 
 /// What belongs to one of the frames in flight.
 pub(crate) struct Slot {
@@ -23,7 +22,7 @@ impl Slot {
     pub fn new(host: &Host) -> Result<Slot, Error> {
         // The extent pass completes it where positions are prepared on the device.
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
-        let frame_block = Buffer::new(host, "frame block", scale::BLOCKS, usage, MemoryLocation::CpuToGpu)?;
+        let frame_block = Buffer::new(host, "frame block", scale::BLOCKS, usage, Location::Upload)?;
         let pool = vk::DescriptorPool::null();
         Ok(Slot {
             profiler: Profiler::new(host),

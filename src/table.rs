@@ -4,11 +4,11 @@ use crate::{
     Error,
     access::State,
     device::Host,
+    memory::Location,
     plan::{Home, Made, Plan},
     resources::{Buffer, Image, Resource, Retired, Spec},
 };
 use ash::vk;
-use gpu_allocator::MemoryLocation;
 use std::collections::BTreeMap;
 
 pub(crate) struct Entry {
@@ -66,7 +66,7 @@ impl Table {
             let resource = match &spec {
                 Spec::Image(image) => Resource::Image(Image::new(host, name, image)?),
                 Spec::Buffer { bytes, usage } => {
-                    Resource::Buffer(Buffer::new(host, name, *bytes, *usage, MemoryLocation::GpuOnly)?)
+                    Resource::Buffer(Buffer::new(host, name, *bytes, *usage, Location::Device)?)
                 }
             };
             self.0.insert(name, (Entry { resource, spec, state: State::default() }, per_particle));

@@ -27,7 +27,7 @@ size=$(stat -c %s "$crate")
 tar -xzf "$crate" -C "$folder/unpacked" --strip-components 1
 cd "$folder/unpacked"
 if grep -q 'name = "shaderc' Cargo.lock; then echo "the package would compile shaderc" >&2; exit 1; fi
-cargo run --quiet --locked --no-default-features --example embed -- "$folder/water.ppm"
+cargo run --quiet --locked --no-default-features --features gpu-allocator --example embed -- "$folder/water.ppm"
 [ -s "$folder/water.ppm" ]
 # The command line builds from it too.
 cargo check --quiet --locked --bins

@@ -218,7 +218,7 @@ mod tests {
         let errors = [
             Error::Unsupported { device: text(), missing: text() },
             Error::Vulkan { what: "a buffer".into(), result: vk::Result::ERROR_DEVICE_LOST },
-            Error::Memory { resource: text(), bytes: 1, source },
+            Error::Memory { resource: text(), bytes: 1, source: source.into() },
             Error::MemoryShort { needed: 2, available: 1, missing: 1 },
             Error::Parameter { parameter: "ior", value: text(), remedy: text() },
             Error::Pass { pass: "cull", problem: text() },

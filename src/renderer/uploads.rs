@@ -6,6 +6,7 @@ use crate::{
     environment::{Equirect, footprints},
     frame::Scene,
     layers::{Kind, field::MOST_POINTS},
+    memory::Location,
     particles::{Class, Particles, Point},
     prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},
@@ -14,7 +15,6 @@ use crate::{
 };
 use ash::vk;
 use glam::{Vec2, Vec3};
-use gpu_allocator::MemoryLocation;
 use std::f32::consts::{PI, TAU};
 
 impl Renderer {
@@ -40,7 +40,7 @@ impl Renderer {
         for name in PARTICLE_ARRAYS {
             let bytes = ARRAY_BYTES * count.max(1) as u64;
             let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
-            match Buffer::new(&self.host, name, bytes, usage, MemoryLocation::CpuToGpu) {
+            match Buffer::new(&self.host, name, bytes, usage, Location::Upload) {
                 Ok(buffer) => made.push(buffer),
                 Err(e) => {
                     made.iter_mut().for_each(|b| b.destroy(&self.host));
@@ -92,7 +92,7 @@ impl Renderer {
             return Err(Error::parameter("speeds", what, "use finite values of at least 0"));
         }
         let (bytes, usage) = (4 * count.max(1) as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
-        let mut buffer = Buffer::new(&self.host, SPEEDS, bytes, usage, MemoryLocation::CpuToGpu)?;
+        let mut buffer = Buffer::new(&self.host, SPEEDS, bytes, usage, Location::Upload)?;
         buffer.mapped()[..size_of_val(speeds)].copy_from_slice(bytemuck::cast_slice(speeds));
         if let Some(old) = self.speeds.replace(buffer) {
             self.retire(Resource::Buffer(old));
@@ -117,7 +117,7 @@ impl Renderer {
             let most = self.limits.storage_size / POINT_BYTES;
             return Err(Error::parameter("points", count, format!("this device holds {most} at most")));
         }
-        let mut buffer = Buffer::new(&self.host, POINTS, bytes, usage, MemoryLocation::CpuToGpu)?;
+        let mut buffer = Buffer::new(&self.host, POINTS, bytes, usage, Location::Upload)?;
         let unit = space::power_of_two(self.scene.space.radius as f32);
         for (p, to) in points.iter().zip(buffer.mapped().chunks_exact_mut(POINT_BYTES as usize)) {
             let density = if p.class == Class::Splash { -p.density } else { p.density };
@@ -176,7 +176,7 @@ impl Renderer {
         }
         let usage = vk::BufferUsageFlags::TRANSFER_SRC;
         let bytes = footprints::BYTES * u64::from(size[0]) * u64::from(size[1]);
-        let mut staging = Buffer::new(&self.host, "environment staging", bytes, usage, MemoryLocation::CpuToGpu)?;
+        let mut staging = Buffer::new(&self.host, "environment staging", bytes, usage, Location::Upload)?;
         let scale = footprints::write(map, &mut staging.mapped()[..bytes as usize]);
         let spec = ImageSpec {
             format: vk::Format::R32G32B32A32_UINT,

@@ -23,6 +23,7 @@ mod half;
 mod host;
 mod layers;
 mod lookup;
+mod memory;
 mod methods;
 mod motion;
 mod normals;

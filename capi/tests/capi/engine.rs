@@ -10,7 +10,8 @@ use std::{fs, path::Path, process::Command};
 fn rust_picture(file: &Path, driver: &str) -> Vec<u8> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let mut embed = Command::new(cargo);
-    embed.current_dir(root()).args(["run", "--quiet", "--locked", "--no-default-features", "--example", "embed", "--"]);
+    let features = ["--no-default-features", "--features", "gpu-allocator"];
+    embed.current_dir(root()).args(["run", "--quiet", "--locked"]).args(features).args(["--example", "embed", "--"]);
     run(embed.arg(file).arg(driver));
     fs::read(file).expect("a picture")
 }
