@@ -57,8 +57,13 @@ for line in "${lines[@]}"; do
   IFS=$'\t' read -r file from to test <<< "${line// ::: /$'\t'}"
   FROM=$from TO=$to perl -0pi -e 'my $n = s/\Q$ENV{FROM}\E/$ENV{TO}/g; die "$ARGV: found $n times: $ENV{FROM}\n" if $n != 1' "$copy/$file"
   place "$test"
-  if run "$binary" "$name"; then
+  code=0
+  run "$binary" "$name" || code=$?
+  if [ $code = 0 ]; then
     echo "SURVIVED  $file: $from -> $to ($test)"
+    survived=$((survived + 1))
+  elif [ $code = 124 ]; then
+    echo "TOO LONG  $file: $from -> $to ($test)"
     survived=$((survived + 1))
   elif grep -q "could not compile\|custom build command" "$copy/mutant.log"; then
     echo "NOT BUILT $file: $from -> $to"
