@@ -25,7 +25,7 @@ export CARGO_TARGET_DIR=$PWD/target/mutants SHADERC_LIB_DIR=${SHADERC_LIB_DIR:-$
 # Dependencies are what they are: taken over from the usual build, where there is one. Ours are not.
 if [ ! -e target/mutants ] && [ -d target/debug/deps ]; then
   (cd target && find debug/deps debug/build debug/.fingerprint -type f ! -path '*meniscus*' -regextype posix-extended \
-     ! -regex '.*/(gpu|cpu|cli|endurance|memory|view|fuzz|embed|capi)-[^/]*(/.*)?' -print0 |
+     ! -regex '.*/(gpu|cpu|cli|endurance|memory|view|fuzz|embed|capi|host)-[^/]*(/.*)?' -print0 |
      { mkdir -p mutants && xargs -0 cp -l --parents -t mutants; })
 fi
 
@@ -34,16 +34,18 @@ run() { # tests of one binary, in the copy
   [ "$1" != lib ] || binary=(--lib)
   [ "$1" != capi ] || binary=(-p meniscus-capi --test capi)
   [ "$1" != capilib ] || binary=(-p meniscus-capi --lib)
+  [ "$1" != wgpu ] || binary=(-p meniscus-wgpu --test host)
+  [ "$1" != wgpulib ] || binary=(-p meniscus-wgpu --lib)
   (cd "$copy" && timeout 900 cargo test --quiet "${binary[@]}" -- --exact "${@:2}" > mutant.log 2>&1)
 }
 place() { # binary and name of a test
   case $1 in
-    endurance::* | memory::* | cpu::* | cli::* | view::* | lib::* | capi::* | capilib::*) binary=${1%%::*} name=${1#*::} ;;
+    endurance::* | memory::* | cpu::* | cli::* | view::* | lib::* | capi::* | capilib::* | wgpu::* | wgpulib::*) binary=${1%%::*} name=${1#*::} ;;
     *) binary=gpu name=$1 ;;
   esac
 }
 # Without a mistake they pass, or their failing would say nothing.
-for each in gpu endurance memory cpu cli view lib capi capilib; do
+for each in gpu endurance memory cpu cli view lib capi capilib wgpu wgpulib; do
   sound=()
   for line in "${lines[@]}"; do
     place "${line##* ::: }"
