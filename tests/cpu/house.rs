@@ -70,7 +70,8 @@ fn walk(folder: &Path, check: &mut dyn FnMut(&Path)) {
 
 #[test]
 fn no_file_is_too_long() {
-    for folder in ["src", "glsl", "tests", "build", "examples", "capi", "hosts/wgpu"] {
+    let bevy = ["hosts/bevy/src", "hosts/bevy/examples", "hosts/bevy/tests"];
+    for folder in ["src", "glsl", "tests", "build", "examples", "capi", "hosts/wgpu"].into_iter().chain(bevy) {
         walk(&root().join(folder), &mut |path| {
             // Made of the sources, for programs.
             if path.ends_with("capi/include/meniscus.h") {
