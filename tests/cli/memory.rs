@@ -61,6 +61,19 @@ fn what_trembles_does_not_flicker() {
     assert_eq!(column(&run, "low.csv", "class_changes"), every);
 }
 
+/// Splash of one frame is splash as long as the memory reaches it, and body again after.
+#[test]
+fn what_is_farther_back_is_forgotten() {
+    let run = Run::new();
+    trembling(&run, 6);
+    for frame in 2..6 {
+        fs::copy(run.path("f/p0.csv"), run.path(&format!("f/p{frame}.csv"))).expect("copied");
+    }
+    made(&run, "out/#.png", &["--stats", "s.csv", "--memory", "2"]);
+    assert_eq!(column(&run, "s.csv", "body"), ["36", "0", "0", "0", "36", "36"]);
+    assert_eq!(column(&run, "s.csv", "class_changes"), ["", "36", "0", "0", "36", "0"]);
+}
+
 /// Whichever are made, in whatever order, they are what they are in one go.
 #[test]
 fn in_parts_it_is_what_it_is_in_one_go() {
