@@ -20,7 +20,7 @@ copy=$(mktemp -d)
 trap 'rm -rf "$copy"' EXIT
 git ls-files -z | xargs -0 cp --parents -t "$copy"
 mkdir -p "$copy/target"
-for made in shaderc mesa25; do [ ! -e "target/$made" ] || ln -s "$PWD/target/$made" "$copy/target/$made"; done
+for made in shaderc mesa25 layers; do [ ! -e "target/$made" ] || ln -s "$PWD/target/$made" "$copy/target/$made"; done
 export CARGO_TARGET_DIR=$PWD/target/mutants SHADERC_LIB_DIR=${SHADERC_LIB_DIR:-$PWD/target/shaderc}
 # Dependencies are what they are: taken over from the usual build, where there is one. Ours are not.
 if [ ! -e target/mutants ] && [ -d target/debug/deps ]; then

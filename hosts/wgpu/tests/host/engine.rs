@@ -23,6 +23,11 @@ fn run(arguments: &[&str], file: &Path, driver: &str) -> String {
     command.current_dir(root()).args(["run", "--quiet", "--locked"]).args(arguments).arg("--").arg(file).arg(driver);
     if arguments.contains(&"engine") {
         command.arg("--validate");
+        // The newer layer, where setup.sh has found it: it alone looks from one command buffer to the next.
+        let layers = root().join("target/layers");
+        if std::env::var_os("VK_LAYER_PATH").is_none() && layers.join("VkLayer_khronos_validation.json").exists() {
+            command.env("VK_LAYER_PATH", layers);
+        }
     }
     let output = command.output().expect("cargo");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
