@@ -471,6 +471,11 @@ fn reader(path: &Path) -> Result<Option<Reader>, ReadError> {
         "csv" => Reader::Whole(csv::read),
         "npy" => Reader::Parts(numpy::read_npy),
         "npz" => Reader::Parts(numpy::read_npz),
+        "vtkhdf" => {
+            let remedy = "save it as .vtu or .vtp in ParaView, or by VTK (the README has a line for it)";
+            let detail = "VTKHDF is not read".into();
+            return Err(ReadError::Malformed { path: path.into(), at: At::Unknown, detail, remedy });
+        }
         _ => return Err(ReadError::UnknownExtension { path: path.into(), extension }),
     }))
 }
