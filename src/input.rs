@@ -10,6 +10,8 @@ use crate::{
 };
 use ash::vk;
 pub use motion::{Before, DeviceVectors, Motion, MovingParticles};
+#[cfg(feature = "host")]
+pub(crate) use surface::has_depth_and_stencil;
 use surface::{COLOR_LAYOUTS, check_attached};
 pub(crate) use surface::{Says, has_depth, is_halved};
 pub use surface::{SurfaceOutput, SurfaceOutputs};

@@ -32,7 +32,19 @@ submit() {
   rm -rf out film.gif
   "$meniscus" submit --engine "$1" -o "job-$1" --tasks 3 "${@:2}" -- $(sequence -o 'out/##.png' -o film.gif)
 }
-until_there() { for ((i = 0; i < 4000; i++)); do [ ! -e "$1" ] || return 0; sleep 0.1; done; echo "no $1" >&2; cat job-*/*.log >&2; return 1; }
+until_there() { for ((i = 0; i < 4000; i++)); do [ ! -e "$1" ] || return 0; sleep 0.1; done; echo "no $1" >&2; cat ./*.log job-*/*.log >&2; return 1; }
+# A process and all that came of it.
+family() { local child; echo "$1"; for child in $(pgrep -P "$1"); do family "$child"; done; }
+# Ended hard while it works, with all its tasks, and started again.
+interrupted() {
+  "$@" > first.log 2>&1 &
+  local running=$!
+  until_there out/01.png
+  kill -KILL $(family "$running") 2> /dev/null || true
+  wait "$running" 2> /dev/null || true
+  [ ! -e film.gif ] || { echo "it was over before it was ended" >&2; return 1; }
+  "$@" > second.log 2>&1 || { cat second.log >&2; return 1; }
+}
 compare() {
   until_there film.gif
   diff -r whole out
@@ -84,28 +96,17 @@ CONF
 
 openjd() {
   submit openjd
-  # Ended hard while it works, and started again.
-  setsid ./job-openjd/submit.sh > openjd.log 2>&1 &
-  local running=$!
-  until_there out/01.png
-  # It gives its tasks sessions of their own.
-  kill -KILL -- "-$running"
-  pkill -KILL -f -- '--part [0-2]/3' || true
-  wait "$running" 2> /dev/null || true
-  rm -f film.gif
-  ./job-openjd/submit.sh > again.log 2>&1
-  compare again.log openjd.log
-  command openjd --version 2> /dev/null || true
+  interrupted ./job-openjd/submit.sh
+  compare first.log second.log
+  command openjd --version
 }
 
-hyperqueue() {
-  submit hyperqueue
-  # Its local cluster takes the tasks of the job file.
+# Its local cluster takes the tasks of the job file.
+cluster() {
   python3 - <<'PYTHON'
-import tomllib, hyperqueue
+import tomllib
 from hyperqueue import Job, LocalCluster
 from hyperqueue.cluster import WorkerConfig
-from hyperqueue.task.task import Task
 tasks = tomllib.load(open("job-hyperqueue/job.toml", "rb"))["task"]
 with LocalCluster() as cluster:
     cluster.start_worker(WorkerConfig(cores=2))
@@ -117,7 +118,13 @@ with LocalCluster() as cluster:
     client = cluster.client()
     client.wait_for_jobs([client.submit(job)])
 PYTHON
+}
+
+hyperqueue() {
+  submit hyperqueue
+  interrupted cluster
   compare job-hyperqueue/part-*.log
+  python3 -c 'import importlib.metadata as m; print("HyperQueue", m.version("hyperqueue"))'
 }
 
 for engine in "${@:-slurm}"; do

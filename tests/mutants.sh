@@ -20,12 +20,12 @@ copy=$(mktemp -d)
 trap 'rm -rf "$copy"' EXIT
 git ls-files -z | xargs -0 cp --parents -t "$copy"
 mkdir -p "$copy/target"
-for made in shaderc mesa25; do [ ! -e "target/$made" ] || ln -s "$PWD/target/$made" "$copy/target/$made"; done
+for made in shaderc mesa25 layers; do [ ! -e "target/$made" ] || ln -s "$PWD/target/$made" "$copy/target/$made"; done
 export CARGO_TARGET_DIR=$PWD/target/mutants SHADERC_LIB_DIR=${SHADERC_LIB_DIR:-$PWD/target/shaderc}
 # Dependencies are what they are: taken over from the usual build, where there is one. Ours are not.
 if [ ! -e target/mutants ] && [ -d target/debug/deps ]; then
   (cd target && find debug/deps debug/build debug/.fingerprint -type f ! -path '*meniscus*' -regextype posix-extended \
-     ! -regex '.*/(gpu|cpu|cli|endurance|memory|view|fuzz|embed|capi)-[^/]*(/.*)?' -print0 |
+     ! -regex '.*/(gpu|cpu|cli|endurance|memory|view|fuzz|embed|capi|host)-[^/]*(/.*)?' -print0 |
      { mkdir -p mutants && xargs -0 cp -l --parents -t mutants; })
 fi
 
@@ -34,16 +34,18 @@ run() { # tests of one binary, in the copy
   [ "$1" != lib ] || binary=(--lib)
   [ "$1" != capi ] || binary=(-p meniscus-capi --test capi)
   [ "$1" != capilib ] || binary=(-p meniscus-capi --lib)
+  [ "$1" != wgpu ] || binary=(-p meniscus-wgpu --test host)
+  [ "$1" != wgpulib ] || binary=(-p meniscus-wgpu --lib)
   (cd "$copy" && timeout 900 cargo test --quiet "${binary[@]}" -- --exact "${@:2}" > mutant.log 2>&1)
 }
 place() { # binary and name of a test
   case $1 in
-    endurance::* | memory::* | cpu::* | cli::* | view::* | lib::* | capi::* | capilib::*) binary=${1%%::*} name=${1#*::} ;;
+    endurance::* | memory::* | cpu::* | cli::* | view::* | lib::* | capi::* | capilib::* | wgpu::* | wgpulib::*) binary=${1%%::*} name=${1#*::} ;;
     *) binary=gpu name=$1 ;;
   esac
 }
 # Without a mistake they pass, or their failing would say nothing.
-for each in gpu endurance memory cpu cli view lib capi capilib; do
+for each in gpu endurance memory cpu cli view lib capi capilib wgpu wgpulib; do
   sound=()
   for line in "${lines[@]}"; do
     place "${line##* ::: }"
@@ -57,8 +59,13 @@ for line in "${lines[@]}"; do
   IFS=$'\t' read -r file from to test <<< "${line// ::: /$'\t'}"
   FROM=$from TO=$to perl -0pi -e 'my $n = s/\Q$ENV{FROM}\E/$ENV{TO}/g; die "$ARGV: found $n times: $ENV{FROM}\n" if $n != 1' "$copy/$file"
   place "$test"
-  if run "$binary" "$name"; then
+  code=0
+  run "$binary" "$name" || code=$?
+  if [ $code = 0 ]; then
     echo "SURVIVED  $file: $from -> $to ($test)"
+    survived=$((survived + 1))
+  elif [ $code = 124 ]; then
+    echo "TOO LONG  $file: $from -> $to ($test)"
     survived=$((survived + 1))
   elif grep -q "could not compile\|custom build command" "$copy/mutant.log"; then
     echo "NOT BUILT $file: $from -> $to"

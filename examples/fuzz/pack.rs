@@ -41,6 +41,18 @@ pub fn lz4(content: &[u8]) -> Vec<u8> {
     lz4_flex::block::compress(content)
 }
 
+/// In Houdini's container: half in a chunk that is copied, half in one of LZ4.
+pub fn scf(content: &[u8]) -> Vec<u8> {
+    let (copied, packed) = content.split_at(content.len() / 2);
+    let chunk = |flags: u8, full: &[u8], body: &[u8]| {
+        let sizes = [full.len(), full.len(), 16 + body.len()].map(|length| (length as u32).to_le_bytes()).concat();
+        [&[2, 1, flags, 1][..], &sizes, body].concat()
+    };
+    let block = lz4(packed);
+    let body = [&20_u32.to_le_bytes()[..], &(block.len() as u32).to_le_bytes(), &block].concat();
+    [b"scf1\0\0\0\0\0\0\0\0", &chunk(2, copied, copied)[..], &chunk(1 << 5 | 16, packed, &body), b"\x001fcs"].concat()
+}
+
 /// With a dictionary that a small budget has room for.
 pub fn xz(content: &[u8]) -> Vec<u8> {
     let mut options = lzma_rust2::XzOptions::with_preset(0);

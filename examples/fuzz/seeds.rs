@@ -74,6 +74,7 @@ pub fn of(format: &str) -> Vec<Seed> {
             bgeo(b"\0\x05class\0\x01\0\0\0\x01\0\0\0\0", 1),
             bgeo(b"\0\x01v\0\x03\0\0\0\x05\0\0\0\0\0\0\0\0\0\0\0\0", 3),
             bgeo(b"\0\x01v\0\x02\0\0\0\x00\0\0\0\0\0\0\0\0", 2),
+            include_bytes!("../../tests/corpus/bgeo_houdini.bgeo").to_vec(),
         ],
         "npy" => npy(),
         "npz" => npy(),
@@ -99,7 +100,7 @@ pub fn of(format: &str) -> Vec<Seed> {
     .collect();
     // The same content again, packed.
     let more: &[Pack] = match format {
-        "bgeo" => &[pack::gzip],
+        "bgeo" => &[pack::gzip, pack::scf],
         "npz" => &[
             |array| pack::npz(&[("position", array)], Stored),
             |array| pack::npz(&[("points", array)], Deflated),

@@ -44,8 +44,8 @@ impl<'a> Canvas<'a> {
             true => (vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT, vk::ImageAspectFlags::DEPTH),
             false => (vk::ImageUsageFlags::COLOR_ATTACHMENT, vk::ImageAspectFlags::COLOR),
         };
-        let stencil = [vk::Format::D16_UNORM_S8_UINT, vk::Format::D24_UNORM_S8_UINT, vk::Format::D32_SFLOAT_S8_UINT];
-        let aspects = if stencil.contains(&format) { aspect | vk::ImageAspectFlags::STENCIL } else { aspect };
+        let stencil = crate::input::has_depth_and_stencil(format);
+        let aspects = if stencil { aspect | vk::ImageAspectFlags::STENCIL } else { aspect };
         let spec = crate::resources::ImageSpec {
             format,
             size,

@@ -3,11 +3,8 @@
 use super::{Gpu, HostError, Instance, vulkan};
 use ash::vk;
 use std::{
+    cell::Cell,
     ffi::{CStr, c_char},
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicU64, Ordering},
-    },
     time::Instant,
 };
 
@@ -47,7 +44,7 @@ impl Calibration {
     }
 }
 
-enum Clock {
+enum Asked {
     Khr(ash::khr::calibrated_timestamps::Device),
     Ext(ash::ext::calibrated_timestamps::Device),
 }
@@ -57,20 +54,26 @@ enum Clock {
 pub(super) struct Tools {
     clock: Option<Clock>,
     boundary: bool,
-    frame: AtomicU64,
-    stages: Mutex<Option<Stages>>,
+    frame: Cell<u64>,
+    stages: Cell<Option<Stages>>,
+}
+
+struct Clock {
+    asked: Asked,
+    tick_ns: f64,
+    mask: u64,
 }
 
 impl Tools {
     /// What is chained to the last submission of a frame.
     pub fn end_of_frame(&self) -> Option<vk::FrameBoundaryEXT<'static>> {
-        let id = self.frame.fetch_add(1, Ordering::Relaxed);
+        let id = self.frame.replace(self.frame.get() + 1);
         let boundary = vk::FrameBoundaryEXT::default().flags(vk::FrameBoundaryFlagsEXT::FRAME_END).frame_id(id);
         self.boundary.then_some(boundary)
     }
 
     pub fn note(&self, stages: Stages) {
-        *self.stages.lock().unwrap_or_else(PoisonError::into_inner) = Some(stages);
+        self.stages.set(Some(stages));
     }
 }
 
@@ -100,12 +103,15 @@ impl<'a> Gpu<'a> {
         }
         let mut gpu = Gpu::with(instance, info, &names, create, false)?;
         gpu.tools.boundary = marks;
-        gpu.tools.clock = clock.map(|name| {
-            if name == clocks[0] {
-                Clock::Khr(ash::khr::calibrated_timestamps::Device::new(&instance.handle, &gpu.device))
+        let limits = gpu.host(1).limits();
+        gpu.tools.clock = clock.zip(limits.timestamp_period).map(|(name, tick_ns)| Clock {
+            asked: if name == clocks[0] {
+                Asked::Khr(ash::khr::calibrated_timestamps::Device::new(&instance.handle, &gpu.device))
             } else {
-                Clock::Ext(ash::ext::calibrated_timestamps::Device::new(&instance.handle, &gpu.device))
-            }
+                Asked::Ext(ash::ext::calibrated_timestamps::Device::new(&instance.handle, &gpu.device))
+            },
+            tick_ns: f64::from(tick_ns),
+            mask: limits.timestamp_mask,
         });
         Ok(gpu)
     }
@@ -113,29 +119,27 @@ impl<'a> Gpu<'a> {
     /// The device's time now, and the host's; `None` unless the device was made [`profiled`](Gpu::profiled) and offers it.
     pub fn calibrate(&self) -> Result<Option<Calibration>, HostError> {
         let Some(clock) = &self.tools.clock else { return Ok(None) };
-        let limits = self.host(1).limits();
-        let Some(tick_ns) = limits.timestamp_period.map(f64::from) else { return Ok(None) };
         let info = [vk::CalibratedTimestampInfoKHR::default().time_domain(vk::TimeDomainKHR::DEVICE)];
         let before = Instant::now();
         // SAFETY: the extension is enabled; every device that has it has its own time domain.
         let read = unsafe {
-            match clock {
-                Clock::Khr(clock) => clock.get_calibrated_timestamps(&info),
-                Clock::Ext(clock) => clock.get_calibrated_timestamps(&info),
+            match &clock.asked {
+                Asked::Khr(clock) => clock.get_calibrated_timestamps(&info),
+                Asked::Ext(clock) => clock.get_calibrated_timestamps(&info),
             }
         };
         let asked = before.elapsed();
         let (ticks, _) = read.map_err(vulkan("calibrated timestamps"))?;
         Ok(Some(Calibration {
-            device_ns: (ticks[0] & limits.timestamp_mask) as f64 * tick_ns,
-            period_ns: (limits.timestamp_mask as f64 + 1.0) * tick_ns,
+            device_ns: (ticks[0] & clock.mask) as f64 * clock.tick_ns,
+            period_ns: (clock.mask as f64 + 1.0) * clock.tick_ns,
             host: before + asked / 2,
         }))
     }
 
     /// When the last frame ([`Gpu::run_frame`]) was recorded, submitted and done.
     pub fn stages(&self) -> Option<Stages> {
-        *self.tools.stages.lock().unwrap_or_else(PoisonError::into_inner)
+        self.tools.stages.get()
     }
 
     /// Whether ends of frames are marked for capturing tools.

@@ -156,8 +156,13 @@ impl Says {
 /// Whether a format has depth.
 pub(crate) fn has_depth(format: vk::Format) -> bool {
     use vk::Format as F;
-    let with_stencil = matches!(format, F::D16_UNORM_S8_UINT | F::D24_UNORM_S8_UINT | F::D32_SFLOAT_S8_UINT);
-    with_stencil || matches!(format, F::D16_UNORM | F::X8_D24_UNORM_PACK32 | F::D32_SFLOAT)
+    has_depth_and_stencil(format) || matches!(format, F::D16_UNORM | F::X8_D24_UNORM_PACK32 | F::D32_SFLOAT)
+}
+
+/// Whether a format has both.
+pub(crate) fn has_depth_and_stencil(format: vk::Format) -> bool {
+    use vk::Format as F;
+    matches!(format, F::D16_UNORM_S8_UINT | F::D24_UNORM_S8_UINT | F::D32_SFLOAT_S8_UINT)
 }
 
 /// Whether a format holds vectors as (n + 1) / 2.

@@ -6,6 +6,9 @@
 //! [`budget`](super::budget).
 
 mod bgeo;
+mod bgeo_json;
+mod bgeo_points;
+mod blosc;
 mod collection;
 mod contents;
 mod csv;
@@ -15,6 +18,7 @@ mod numpy;
 mod numpy_header;
 mod ply;
 mod ply_header;
+mod scf;
 mod source;
 mod text;
 mod vtk;
@@ -53,7 +57,11 @@ pub const FORMATS: &[(&str, &str)] = &[
     ("vtpc", "collections of these, as .vtm"),
     ("pvd", "ParaView collection: of one time, whose files are joined; of several, for `meniscus sequence`"),
     ("ply", "PLY, ASCII or binary: element `vertex` with x, y, z; properties `class`, `id`, vx, vy, vz"),
-    ("bgeo", "Houdini/Partio BGEO version 5, plain or gzip; attributes `class`, `id`, `v` (or `velocity`)"),
+    (
+        "bgeo",
+        "Houdini's geometry, and version 5, as Partio writes it; plain or gzip (also .bgeo.gz); attributes `class`, `id`, `v` (or `velocity`)",
+    ),
+    ("bgeo.sc", "as .bgeo, in chunks of Blosc: LZ4, BloscLZ, zlib"),
     ("xyz", "raw little-endian float32 triples, or text columns x y z with decimal points"),
     (
         "csv",
@@ -454,10 +462,20 @@ fn reader(path: &Path) -> Result<Option<Reader>, ReadError> {
         "vtu" | "vtp" => Reader::Whole(vtk_xml::read),
         "ply" => Reader::Whole(ply::read),
         "bgeo" => Reader::Parts(bgeo::read),
+        "sc" | "gz"
+            if path.file_stem().is_some_and(|stem| stem.to_string_lossy().to_lowercase().ends_with(".bgeo")) =>
+        {
+            Reader::Parts(bgeo::read)
+        }
         "xyz" => Reader::Parts(xyz::read),
         "csv" => Reader::Whole(csv::read),
         "npy" => Reader::Parts(numpy::read_npy),
         "npz" => Reader::Parts(numpy::read_npz),
+        "vtkhdf" => {
+            let remedy = "save it as .vtu or .vtp in ParaView, or by VTK (the README has a line for it)";
+            let detail = "VTKHDF is not read".into();
+            return Err(ReadError::Malformed { path: path.into(), at: At::Unknown, detail, remedy });
+        }
         _ => return Err(ReadError::UnknownExtension { path: path.into(), extension }),
     }))
 }

@@ -72,6 +72,25 @@ fn particles_go_on_between_frames() {
     assert!(made(&run, &["--fps", "2", "-o", "o/#.exr", "--ior", "1.4"]).contains("wrote 7"));
 }
 
+/// As many particles, but not the same ones.
+#[test]
+fn others_are_not_on_their_way() {
+    let run = Run::new();
+    fs::create_dir_all(run.path("f")).expect("folder");
+    let rows = |ids: [u32; 2]| ids.map(|id| format!("{id},{id},0,0,1,0,0\n")).concat();
+    for (name, ids) in [("p0", [7, 3]), ("p1", [3, 7]), ("p2", [7, 4])] {
+        run.file(&format!("f/{name}.csv"), format!("id,x,y,z,vx,vy,vz\n{}", rows(ids)));
+    }
+    assert!(made(&run, &["--fps", "2", "-o", "o/#.png", "--frames", "0-2"]).contains("wrote 3"));
+    let args = ["sequence", "f/*.csv", "--step", "1", "--size", "96x72", "--fps", "2", "-o", "p/#.png"];
+    let result = run.command(&[&args[..], GIVEN].concat());
+    let said = text(&result);
+    assert!(
+        !result.status.success() && ["p1.csv", "p2.csv", "id 3", "--step"].iter().all(|w| said.contains(w)),
+        "{said}"
+    );
+}
+
 #[test]
 fn motion_blur_is_the_mean_of_moments() {
     let run = Run::new();

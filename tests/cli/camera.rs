@@ -108,6 +108,33 @@ fn what_blender_exports_is_what_is_seen() {
     assert!(run.pixels("again.png") == run.pixels("one.png"), "named in a scene file it is another");
 }
 
+/// The view goes right and up by parts of the picture, so what it shows goes left and down, by so many pixels.
+#[test]
+fn a_shift_is_as_far_as_it_says() {
+    let run = Run::new();
+    run.file("one.csv", "x,y,z\n0,0,0\n");
+    let middle = |shift: [f64; 2]| -> [f64; 2] {
+        let scene = format!(
+            "size = [96, 72]\nradius = 0.2\nbackground = \"none\"\n[camera]\neye = [0.0, 0.0, 4.0]\ntarget = [0.0, 0.0, 0.0]\n\
+             shift = {shift:?}\n"
+        );
+        run.file("shifted.toml", scene);
+        succeeds(&run, &["render", "one.csv", "--scene", "shifted.toml", "-o", "shifted.png"]);
+        let picture = image::open(run.path("shifted.png")).expect("a picture").to_rgba8();
+        let covered: Vec<_> = picture.enumerate_pixels().filter(|(_, _, p)| p.0[3] > 127).collect();
+        assert!(covered.len() > 20, "{shift:?}: {}", covered.len());
+        let mean = |of: fn(&(u32, u32, &image::Rgba<u8>)) -> u32| {
+            covered.iter().map(|p| f64::from(of(p)) + 0.5).sum::<f64>() / covered.len() as f64
+        };
+        [mean(|p| p.0), mean(|p| p.1)]
+    };
+    for (shift, wanted) in [([0.0, 0.0], [48.0, 36.0]), ([0.25, 0.125], [24.0, 45.0]), ([-0.125, -0.25], [60.0, 18.0])]
+    {
+        let found = middle(shift);
+        assert!((0..2).all(|i| (found[i] - wanted[i]).abs() < 1.0), "{shift:?}: {found:?}, not {wanted:?}");
+    }
+}
+
 /// Between simulated frames the camera is between its own.
 #[test]
 fn the_camera_moves_between_frames() {

@@ -58,6 +58,10 @@ impl Run {
         self.path(name).to_string_lossy().into_owned()
     }
 
+    fn json(&self, name: &str) -> serde_json::Value {
+        serde_json::from_slice(&fs::read(self.path(name)).expect("written")).expect("JSON")
+    }
+
     /// The program, not started yet.
     fn prepared(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_meniscus"));

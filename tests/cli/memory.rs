@@ -61,6 +61,19 @@ fn what_trembles_does_not_flicker() {
     assert_eq!(column(&run, "low.csv", "class_changes"), every);
 }
 
+/// Splash of one frame is splash as long as the memory reaches it, and body again after.
+#[test]
+fn what_is_farther_back_is_forgotten() {
+    let run = Run::new();
+    trembling(&run, 6);
+    for frame in 2..6 {
+        fs::copy(run.path("f/p0.csv"), run.path(&format!("f/p{frame}.csv"))).expect("copied");
+    }
+    made(&run, "out/#.png", &["--stats", "s.csv", "--memory", "2"]);
+    assert_eq!(column(&run, "s.csv", "body"), ["36", "0", "0", "0", "36", "36"]);
+    assert_eq!(column(&run, "s.csv", "class_changes"), ["", "36", "0", "0", "36", "0"]);
+}
+
 /// Whichever are made, in whatever order, they are what they are in one go.
 #[test]
 fn in_parts_it_is_what_it_is_in_one_go() {
@@ -109,4 +122,43 @@ fn memory_ends_with_other_particles() {
     let gpu = ["sequence", "f/*.csv", "-o", "#.png", "--memory", "3", "--prepare", "gpu"];
     run.refused(1, &gpu, &["--memory", "--prepare cpu"]);
     run.refused(2, &["sequence", "f/*.csv", "-o", "#.png", "--keep-class-below", "0.5"], &["--memory"]);
+}
+
+/// Three rows that tremble, three that do not, and eight other splashes in each frame, which come before all by their ids or after.
+fn renewed(run: &Run, folder: &str, shuffled: bool) {
+    fs::create_dir_all(run.path(folder)).expect("folder");
+    for frame in 0..5_u32 {
+        let mut rows = Vec::new();
+        for (row, i) in (0..6).flat_map(|row| (0..8).map(move |i| (row, i))) {
+            let spacing = if frame % 2 == 1 && row < 3 { 0.1015 } else { 0.0985 };
+            rows.push(format!("{},{},{},0.2\n", 1000 + 8 * row + i, spacing * f64::from(i), 0.4 * f64::from(row)));
+        }
+        for i in 0..8 {
+            rows.push(format!("{},{},9,9\n", 2000 * (frame % 2) + 10 * frame + i, i));
+        }
+        if frame == 4 {
+            rows.pop();
+        }
+        let count = rows.len();
+        let at = |i: usize| if shuffled { (13 * i + 7 * frame as usize) % count } else { i };
+        let text: String = (0..count).map(|i| rows[at(i)].as_str()).collect();
+        run.file(&format!("{folder}/p{frame}.csv"), format!("id,x,y,z\n{text}"));
+    }
+}
+
+/// Where files have ids it is by them that particles are followed: in whatever order they are written, and whoever comes and goes.
+#[test]
+fn particles_are_followed_by_their_ids() {
+    let run = Run::new();
+    for (folder, shuffled) in [("f", false), ("g", true)] {
+        renewed(&run, folder, shuffled);
+        let (pattern, output, table) = (format!("{folder}/*.csv"), format!("{folder}/#.png"), format!("{folder}.csv"));
+        let args = ["sequence", &pattern, "--size", "64x48", "--method", "imai16", "-o", &output, "--stats", &table];
+        let result = run.command(&[&args[..], GIVEN, &["--memory", "3"]].concat());
+        assert!(result.status.success(), "{}", text(&result));
+        // As it is without the others: what trembles is splash from the second frame on.
+        assert_eq!(column(&run, &table, "body"), ["36", "18", "18", "18", "18"], "{folder}");
+        assert_eq!(column(&run, &table, "class_changes"), ["", "18", "0", "0", "0"], "{folder}");
+    }
+    assert!((0..5).all(|i| run.pixels(&format!("f/{i}.png")) == run.pixels(&format!("g/{i}.png"))));
 }

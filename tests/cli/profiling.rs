@@ -7,10 +7,6 @@ use std::{collections::BTreeSet, fs};
 
 const SMALL: [&str; 6] = ["--size", "64x48", "--frames", "3", "--warmup", "1"];
 
-fn read(run: &Run, name: &str) -> Value {
-    serde_json::from_slice(&fs::read(run.path(name)).expect("written")).expect("JSON")
-}
-
 /// Zones are in order, and each lies within the one it is nested in: frame, part, pass.
 #[test]
 fn a_trace_nests_passes_in_parts_in_frames() {
@@ -19,7 +15,7 @@ fn a_trace_nests_passes_in_parts_in_frames() {
     let args =
         [&["bench", &cloud, "--methods", "field,imai16", "--trace", "trace.json", "-o", "b.json"], &SMALL[..]].concat();
     run.succeeds(&args, &["b.json", "cloud.csv", "trace.json"]);
-    let (trace, figures) = (read(&run, "trace.json"), read(&run, "b.json"));
+    let (trace, figures) = (run.json("trace.json"), run.json("b.json"));
     let events = trace["traceEvents"].as_array().expect("events");
     let number = |e: &Value, key: &str| e[key].as_f64().unwrap_or_else(|| panic!("no {key} in {e}"));
     for (process, measured) in figures["runs"].as_array().expect("runs").iter().enumerate() {
@@ -74,7 +70,7 @@ fn the_hosts_work_and_the_devices_are_on_one_axis() {
         println!("{device}: tells the time: {tells}; marks frames: {}", gpu.marks_frames());
         let output = run.command(&[&["bench", &cloud, "--device", &device, "--trace", "t.json"], &SMALL[..]].concat());
         assert!(output.status.success(), "{device}: {}", text(&output));
-        let trace = read(&run, "t.json");
+        let trace = run.json("t.json");
         let zones = trace["traceEvents"].as_array().expect("events").iter().filter(|e| e["ph"] == "X");
         let (host, own): (Vec<&Value>, Vec<_>) = zones.partition(|z| z["cat"] == "host");
         let number = |z: &Value, key: &str| z[key].as_f64().expect("a number");
@@ -191,7 +187,7 @@ fn fields_of_figures_are_documented() {
     let args = [&["bench", &cloud, "--scaling", "--max-particles", "10000", "-o"], &["b.json"][..], &SMALL].concat();
     assert!(run.command(&args).status.success());
     let mut found = BTreeSet::new();
-    names(&read(&run, "b.json"), &["parts", "settings", "units", "asked", "variables"], &mut found);
+    names(&run.json("b.json"), &["parts", "settings", "units", "asked", "variables"], &mut found);
     let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/figures.md")).expect("docs/figures.md");
     let table = text.split("## JSON").nth(1).and_then(|t| t.split("## ").next()).expect("a section");
     let rows = table.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());

@@ -3,11 +3,6 @@
 use crate::{Run, block, text};
 use meniscus::{Method, Settings, parameters::Part, prepare};
 use serde_json::{Value, json};
-use std::fs;
-
-fn read(run: &Run, name: &str) -> Value {
-    serde_json::from_slice(&fs::read(run.path(name)).expect("written")).expect("JSON")
-}
 
 #[test]
 fn help_lists_every_parameter_as_the_library_describes_it() {
@@ -44,7 +39,7 @@ fn every_parameter_is_recorded() {
     let mut settings = Settings::from(Method::preset("imai16").expect("a preset"));
     settings.set("sigma", "4").expect("set");
     settings.set("ior", "1.4").expect("set");
-    for frame in [&read(&run, "s.json")["frame"], &read(&run, "d/frame.json")] {
+    for frame in [&run.json("s.json")["frame"], &run.json("d/frame.json")] {
         let mut names: Vec<_> = settings.parameters().iter().map(|p| p.name).collect();
         names.extend(settings.method.members().map(|m| m.0));
         names.sort_unstable();
@@ -82,7 +77,7 @@ fn what_is_said_later_counts() {
     );
     let settings = |more: &[&str]| {
         run.render(&[&[&block, "--scene", "all.toml", "--stats", "s.json"], more].concat());
-        let all = &read(&run, "s.json")["frame"]["settings"];
+        let all = &run.json("s.json")["frame"]["settings"];
         let numbers = ["window", "iterations", "internal_reflections"].map(|n| all[n].as_u64());
         (numbers, all["optics"].as_str().expect("a name").to_owned(), all["ior"].as_f64())
     };

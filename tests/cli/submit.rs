@@ -176,10 +176,16 @@ fn an_openjd_template_makes_it() {
         assert_eq!(template["steps"][1]["dependencies"][0]["dependsOn"], template["steps"][0]["name"]);
         let part = &template["steps"][0]["parameterSpace"]["taskParameterDefinitions"][0];
         assert_eq!((&part["name"], &part["range"]), (&"Part".into(), &"0-2".into()));
+        // Values beside the template: it must not have absolute paths as defaults.
+        let submit = fs::read_to_string(job.join("submit.sh")).expect("a script");
+        assert!(submit.contains("openjd run template.json --job-param file://parameters.json "), "{submit}");
+        let given: Value =
+            serde_json::from_slice(&fs::read(job.join("parameters.json")).expect("values")).expect("JSON");
         let mut values = HashMap::new();
         for parameter in template["parameterDefinitions"].as_array().expect("parameters") {
-            let name = format!("{{{{Param.{}}}}}", parameter["name"].as_str().expect("a name"));
-            values.insert(name, parameter["default"].as_str().expect("a default").to_owned());
+            let name = parameter["name"].as_str().expect("a name");
+            assert!(parameter["default"].is_null(), "{parameter}");
+            values.insert(format!("{{{{Param.{name}}}}}"), given[name].as_str().expect("a value").to_owned());
         }
         let steps = [(0, "0"), (0, "1"), (0, "2"), (1, "")];
         for (step, part) in steps {

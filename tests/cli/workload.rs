@@ -12,10 +12,6 @@ pub fn devices() -> Vec<String> {
     usable
 }
 
-fn read(run: &Run, name: &str) -> Value {
-    serde_json::from_slice(&fs::read(run.path(name)).expect("written")).expect("JSON")
-}
-
 fn commands(frame: &Value) -> &[Value] {
     frame["commands"].as_array().expect("commands")
 }
@@ -37,10 +33,10 @@ fn a_workload_is_the_same_every_time() {
             let output = run.command(&[&args[..], &["a.json", "--validate", "--picture", "a.png"]].concat());
             let said = text(&output);
             assert!(output.status.success(), "{device}: {said}");
-            let all = read(&run, "a.json");
+            let all = run.json("a.json");
             if method == "field" {
                 assert!(run.command(&[&args[..], &["b.json"]].concat()).status.success(), "{device}");
-                assert_eq!(all, read(&run, "b.json"), "{device}");
+                assert_eq!(all, run.json("b.json"), "{device}");
             }
             let frames = all["frames"].as_array().expect("frames");
             assert_eq!(frames.len(), 3);
@@ -95,7 +91,7 @@ fn a_workload_is_what_a_capture_holds() {
     let lines = fs::read_to_string(&text_file).expect("a line for each call");
     let capture: Vec<Value> = lines.lines().map(|l| serde_json::from_str(l).expect("JSON")).collect();
 
-    let all = read(&run, "w.json");
+    let all = run.json("w.json");
     let told = || all["frames"].as_array().expect("frames").iter().flat_map(commands);
     for (kind, indirect, name) in [
         ("dispatch", false, "vkCmdDispatch"),

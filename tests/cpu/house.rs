@@ -70,7 +70,8 @@ fn walk(folder: &Path, check: &mut dyn FnMut(&Path)) {
 
 #[test]
 fn no_file_is_too_long() {
-    for folder in ["src", "glsl", "tests", "build", "examples", "capi"] {
+    let bevy = ["hosts/bevy/src", "hosts/bevy/examples", "hosts/bevy/tests"];
+    for folder in ["src", "glsl", "tests", "build", "examples", "capi", "hosts/wgpu"].into_iter().chain(bevy) {
         walk(&root().join(folder), &mut |path| {
             // Made of the sources, for programs.
             if path.ends_with("capi/include/meniscus.h") {
@@ -97,11 +98,14 @@ fn planted_mistakes_can_be_planted() {
         let folder = match module.split("::").next() {
             Some("cpu" | "cli" | "view" | "endurance" | "memory") => "tests",
             Some("capi") => "capi/tests",
+            Some("wgpu") => "hosts/wgpu/tests/host",
+            Some("wgpulib") => "hosts/wgpu/src",
             Some("lib") => "src",
             Some("capilib") => "capi/src",
             _ => "tests/gpu",
         };
-        let module = module.trim_start_matches("lib::").trim_start_matches("capilib::").replace("::", "/");
+        let outside = ["lib::", "capilib::", "wgpu::", "wgpulib::"];
+        let module = outside.iter().find_map(|o| module.strip_prefix(o)).unwrap_or(module).replace("::", "/");
         // Unit tests may be a module within the file of what they test.
         let within = module.strip_suffix("/tests").unwrap_or(&module);
         let files =

@@ -1,6 +1,8 @@
 //! Everything that needs no device: files, preparation, twins against closed forms.
 
 #[cfg(feature = "io")]
+mod bgeo;
+#[cfg(feature = "io")]
 mod collections;
 #[cfg(feature = "io")]
 mod environment;

@@ -97,3 +97,12 @@ fn blocks_that_lie() {
     huge[8..12].copy_from_slice(&0xf000_0000_u32.to_le_bytes());
     refused(&vtu("vtkLZ4DataCompressor", &huge), "--max-memory");
 }
+
+/// What is not read says what becomes of it; one that is not there is not there.
+#[test]
+fn vtkhdf_has_a_way_out() {
+    let error = read_bytes(Path::new("a.vtkhdf"), b"\x89HDF\r\n", &Budget::default()).expect_err("refused");
+    assert_eq!(error.to_string().split(';').next(), Some("a.vtkhdf: VTKHDF is not read"));
+    assert!(error.to_string().contains(".vtu or .vtp in ParaView"), "{error}");
+    assert!(matches!(read(Path::new("none.vtkhdf")), Err(ReadError::NotFound { .. })));
+}

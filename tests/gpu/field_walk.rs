@@ -185,7 +185,7 @@ fn rays_are_walked_as_the_twin_walks_them() {
             if reflections != 1 {
                 case.settings = case.settings.absorption(Vec3::new(0.2, 1.5, 3.0));
             }
-            all.extend(compare(driver, &case, if refractions == 1 { 5 } else { 11 }));
+            all.extend(compare(driver, &case, if refractions == 1 { 7 } else { 19 }));
         }
         // Each kind of way has been walked; and none ends in the liquid's box without a wall.
         let count = |of: &dyn Fn(&Walk) -> bool| all.iter().filter(|w| of(w)).count();
@@ -212,7 +212,7 @@ fn reflections_are_followed_as_the_twin_follows_them() {
         let before = walked(&shoot(driver, &plain));
         for count in [1, 16] {
             let case = Case { settings: plain.settings.tracing(count), ..plain.clone() };
-            let after = compare(driver, &case, 11);
+            let after = compare(driver, &case, 19);
             let own = |w: &Walk| Walk { color: Vec3::ZERO, ..*w };
             assert!(before.iter().map(own).eq(after.iter().map(own)), "{}: another walk", driver.name);
             let changed = before.iter().zip(&after).filter(|(a, b)| (a.color - b.color).abs().max_element() > 0.02);
@@ -293,7 +293,7 @@ fn the_hosts_scene_is_met() {
             let depth: Vec<f64> = painted.0.iter().map(|d| d / shot.space.radius).collect();
             let scene = Scene { depth: &depth, color: &painted.1, sky: background == Background::Host };
             let (found, bricks) = (walked(&shot), words(&shot).bricks());
-            let chosen = (0..found.len()).into_par_iter().filter(|i| i % 17 == 0);
+            let chosen = (0..found.len()).into_par_iter().filter(|i| i % 31 == 0);
             let pair = |i| (i, found[i], walk_in(&shot, &bricks, own, &case, &shot.frame, Some(scene), i));
             let all: Vec<_> = chosen.map(pair).collect();
             let all: Vec<&Pair> = all.iter().collect();
@@ -302,7 +302,7 @@ fn the_hosts_scene_is_met() {
             at_least("what is hidden", driver, &all, 0.998, |a, b| none(a) == none(b));
             let (beside, liquid): (Vec<&Pair>, Vec<&Pair>) = all.into_iter().partition(|(_, _, twin)| none(twin));
             let met = liquid.iter().filter(|(_, a, _)| a.outcome == OUTCOME_SCENE).count();
-            assert!(met > 20 && beside.len() > 500, "{}: {met} meet the scene", driver.name);
+            assert!(met > 20 && beside.len() > 250, "{}: {met} meet the scene", driver.name);
             at_least("outcome", driver, &liquid, 0.96, |a, b| a.outcome == b.outcome);
             let agree: Vec<&Pair> = liquid.into_iter().filter(|(_, a, b)| same(a, b)).collect();
             at_least("length", driver, &agree, 0.98, |a, b| (a.length - b.length).abs() <= 0.01 * b.length + 0.02);

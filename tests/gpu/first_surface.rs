@@ -48,9 +48,10 @@ fn same(
     twin: impl Fn([usize; 2]) -> Option<First>,
 ) {
     let width = shot.size[0] as usize;
-    let (found, mut off, mut liquid) = (found(shot), Vec::new(), 0);
-    // Every other pixel: the twins' marches are slow.
-    for (i, found) in found.iter().enumerate().filter(|(i, _)| (i % width + i / width).is_multiple_of(2)) {
+    let (found, mut off, mut liquid, mut all) = (found(shot), Vec::new(), 0, 0);
+    // One pixel of five: the twins' marches are slow.
+    for (i, found) in found.iter().enumerate().filter(|(i, _)| (i % width + 2 * (i / width)).is_multiple_of(5)) {
+        all += 1;
         let wanted = twin([i % width, i / width]);
         liquid += usize::from(wanted.is_some());
         let near = |a: &First, b: &First| {
@@ -65,9 +66,9 @@ fn same(
             off.push((i, *found, wanted));
         }
     }
-    println!("{}: {what}: {} of {} off, {liquid} show liquid", driver.name, off.len(), found.len());
+    println!("{}: {what}: {} of {all} off, {liquid} show liquid", driver.name, off.len());
     assert!(liquid > shown, "{}: {what}: {liquid}", driver.name);
-    assert!(off.len() * 2000 <= but * found.len(), "{}: {what}: {}: {:?}", driver.name, off.len(), off.first());
+    assert!(off.len() * 1000 <= but * all, "{}: {what}: {}: {:?}", driver.name, off.len(), off.first());
 }
 
 fn linear(shot: &Shot, painted: &Painted) -> Vec<f64> {
@@ -101,7 +102,7 @@ fn walks_start_where_the_twins_start() {
                 let scene = scene.map(|_| Scene { depth: &depth, color: &painted.1, sky: false });
                 let maps = Maps { scene, ..own.twin(&shot) };
                 let what = format!("{refractions} refractions, inside {eye_inside}, scene {}", maps.scene.is_some());
-                same(driver, &what, &shot, 2, 250, |pixel| of_walks(&maps, refractions == 1, pixel));
+                same(driver, &what, &shot, 2, 100, |pixel| of_walks(&maps, refractions == 1, pixel));
             }
         }
     });
@@ -115,7 +116,7 @@ fn half_resolution_is_upsampled_as_the_twin_does() {
         let case = half::case(half::liquid(), [75, 53], half::settings(optics, None));
         let shot = shoot(driver, &case, None);
         let ((depth, normal), half) = (half::maps(driver, &shot), inspect::half(&shot.frame));
-        same(driver, "half resolution", &shot, 5, 150, |[x, y]| {
+        same(driver, "half resolution", &shot, 5, 60, |[x, y]| {
             let front = upsample(&half, &depth, &normal, &[], DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
             of_half(&shot.frame, &front, [x, y])
         });
@@ -141,7 +142,7 @@ fn a_fields_first_wall_is_the_twins() {
                 let scene = scene.map(|_| Scene { depth: &depth, color: &painted.1, sky: false });
                 let view = Maps { frame: &shot.frame, maps: [[none; 2]; 2], scene };
                 let settings = case.settings.walk();
-                same(driver, &format!("field, scene {}", scene.is_some()), &shot, 4, 700, |pixel| {
+                same(driver, &format!("field, scene {}", scene.is_some()), &shot, 4, 280, |pixel| {
                     twin::first_surface(&field, &view, &settings, &SKY, pixel)
                 });
             }

@@ -45,9 +45,17 @@ fn at<'a>(scene: &'a toml::Table, keys: &str) -> &'a toml::Value {
     rest.split('.').filter(|k| !k.is_empty()).fold(first, |value, key| value.get(key).expect("an entry"))
 }
 
+fn place(scene: &toml::Table, keys: &str) -> [f64; 3] {
+    let place = at(scene, keys).as_array().expect("three numbers");
+    [0, 1, 2].map(|i| place[i].as_float().expect("a number"))
+}
+
 fn eye(scene: &toml::Table) -> [f64; 3] {
-    let eye = at(scene, "camera.eye").as_array().expect("three numbers");
-    [0, 1, 2].map(|i| eye[i].as_float().expect("a number"))
+    place(scene, "camera.eye")
+}
+
+fn target(scene: &toml::Table) -> [f64; 3] {
+    place(scene, "camera.target")
 }
 
 fn moved(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -98,28 +106,33 @@ fn mouse_and_keys_move_the_eye() {
     let (display, folder) = (Display::new(), Folder::new());
     let mut window = Window::open(&display, folder.path(), &["--size", "640x360", "--device", "llvmpipe"]);
     let mut last = folder.is_what_render_writes(&mut window, "llvmpipe");
-    let target = at(&last, "camera.target").clone();
-    let start = eye(&last);
-    let mut goes = |window: &mut Window, what: &str| {
+    let start = [eye(&last), target(&last)];
+    // Whether the eye moves, and what it looks at.
+    let mut goes = |window: &mut Window, what: &str, moves: [bool; 2]| {
         let now = folder.is_what_render_writes(window, "llvmpipe");
-        assert!(moved(eye(&now), eye(&last)) > 1e-3, "{what} moves nothing");
+        for (of, (place, moves)) in ["eye", "target"].iter().zip([eye, target].into_iter().zip(moves)) {
+            let by = moved(place(&now), place(&last));
+            assert!(if moves { by > 1e-3 } else { by < 1e-9 }, "{what} moves the {of} by {by}");
+        }
         last = now;
-        eye(&last)
+        [eye(&last), target(&last)]
     };
     window.drag(1, [500, 200], [560, 180]);
-    goes(&mut window, "an orbit");
+    goes(&mut window, "an orbit", [true, false]);
     window.drag(2, [500, 200], [520, 210]);
-    goes(&mut window, "a pan");
+    goes(&mut window, "a pan", [true, true]);
+    window.drag(3, [500, 200], [520, 210]);
+    goes(&mut window, "a look around", [false, true]);
     window.wheel(true, [500, 200]);
-    goes(&mut window, "the wheel");
+    goes(&mut window, "the wheel", [true, false]);
     window.down(b'w'.into());
     std::thread::sleep(std::time::Duration::from_millis(500));
     window.up(b'w'.into());
-    goes(&mut window, "W");
+    goes(&mut window, "W", [true, true]);
     keep(&window, "moved.png");
     window.types("r");
-    assert!(moved(goes(&mut window, "R"), start) < 1e-9, "R does not go back");
-    assert_eq!(at(&last, "camera.target"), &target);
+    let back = goes(&mut window, "R", [true, true]);
+    assert!((0..2).all(|i| moved(back[i], start[i]) < 1e-9), "R does not go back: {back:?}, {start:?}");
     window.close();
     window.ends();
 }

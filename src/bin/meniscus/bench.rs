@@ -73,8 +73,8 @@ impl Args {
         if let Some(path) = &self.output {
             report::check_extension(path)?;
         }
-        if let Some(path) = self.trace.as_ref().filter(|p| p.extension().is_none_or(|e| e != "json")) {
-            return Err(format!("{}: name a trace that ends in .json", path.display()).into());
+        if let Some(path) = &self.trace {
+            report::check_json(path, "trace")?;
         }
         let files = self.files.iter().chain(&picture.particles);
         let mut inputs: Vec<_> = files.map(|p| ("a particle file", p.as_path())).collect();
@@ -232,13 +232,16 @@ pub fn offset(state: &mut u64, reach: f32) -> Vec3 {
     (2.0 * Vec3::new(unit(state), unit(state), unit(state)) - 1.0) * reach
 }
 
+/// Where the i-th particle of a block lies that is twice as long as it is wide and deep, at rest spacing.
+pub fn place(edge: u32, i: u32) -> Vec3 {
+    2.0 * RADIUS * Vec3::new((i % (2 * edge)) as f32, (i / (2 * edge) % edge) as f32, (i / (2 * edge * edge)) as f32)
+}
+
 /// A block of liquid, 2 : 1 : 1, at rest spacing, each particle a fifth of a radius off its place, in random order.
 fn block(count: u32) -> Vec<Vec3> {
     let mut state = SEED;
     let edge = (f64::from(count) / 2.0).cbrt().ceil() as u32;
-    let place =
-        |i: u32| Vec3::new((i % (2 * edge)) as f32, (i / (2 * edge) % edge) as f32, (i / (2 * edge * edge)) as f32);
-    let mut all: Vec<Vec3> = (0..count).map(|i| 2.0 * RADIUS * place(i) + offset(&mut state, 0.2 * RADIUS)).collect();
+    let mut all: Vec<Vec3> = (0..count).map(|i| place(edge, i) + offset(&mut state, 0.2 * RADIUS)).collect();
     // A simulation's order has little to do with space either.
     for i in (1..all.len()).rev() {
         all.swap(i, (unit(&mut state) * (i + 1) as f32) as usize % (i + 1));

@@ -43,9 +43,7 @@ const COLUMNS: &[(&str, &[&str])] = &[
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let pictures = args.options.each(Prepare::Gpu, &args.methods)?;
     if let Some(path) = &args.output {
-        if path.extension().is_none_or(|e| e != "json") {
-            return Err(format!("{}: name a file that ends in .json", path.display()).into());
-        }
+        report::check_json(path, "file")?;
         let scene = args.options.scene.as_deref().map(|p| ("the scene file (--scene)", p));
         outputs::check(&[("the figures (--output)", path)], None, scene.as_slice())?;
     }

@@ -30,6 +30,14 @@ pub fn check_extension(path: &Path) -> Result<(), String> {
     }
 }
 
+/// Refuses to write `what` in another format than JSON.
+pub fn check_json(path: &Path, what: &str) -> Result<(), String> {
+    match extension(path) {
+        Some("json") => Ok(()),
+        _ => Err(format!("{}: name a {what} that ends in .json", path.display())),
+    }
+}
+
 /// Refuses to measure where validation is on.
 pub fn refuse_validation(device: &DeviceInfo) -> Result<(), String> {
     // Older layers do not say that they are there, but the loader was told.

@@ -8,7 +8,7 @@ use meniscus::{
     Camera, Equirect, FrameInput, Settings,
     ash::vk::ImageView,
     host::{Gpu, HostError, Instance, Session, Upload},
-    io::images::encode_picture,
+    io::images::{check_extension, encode_picture},
     prepare::DevicePositions,
     work::{Command, WorkEntry},
 };
@@ -63,15 +63,17 @@ impl Name {
 
 const FRAMES: u32 = 3;
 
+fn count(edge: u32) -> u32 {
+    2 * edge * edge * edge
+}
+
 /// A pool at rest spacing, twice as long as it is wide and deep, every particle a fifth of a radius off its place; one of 25 is
 /// a drop, above it, that falls. Sums, products and quotients alone, which are the same on every machine.
 fn positions(edge: u32, frame: u32) -> Vec<Vec3> {
     let mut state = bench::SEED;
     let spacing = 2.0 * bench::RADIUS;
-    let place =
-        |i: u32| Vec3::new((i % (2 * edge)) as f32, (i / (2 * edge) % edge) as f32, (i / (2 * edge * edge)) as f32);
-    let all = (0..2 * edge * edge * edge).map(|i| {
-        let at = spacing * place(i) + bench::offset(&mut state, 0.2 * bench::RADIUS);
+    let all = (0..count(edge)).map(|i| {
+        let at = bench::place(edge, i) + bench::offset(&mut state, 0.2 * bench::RADIUS);
         let drop = bench::unit(&mut state) < 0.04;
         if drop { at + Vec3::Y * (spacing * (1.2 * edge as f32 - frame as f32)) } else { at }
     });
@@ -113,8 +115,11 @@ impl Frame {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
-    if let Some(path) = args.output.as_ref().filter(|p| p.extension().is_none_or(|e| e != "json")) {
-        return Err(format!("{}: name a file that ends in .json", path.display()).into());
+    if let Some(path) = &args.output {
+        report::check_json(path, "file")?;
+    }
+    if let Some(path) = &args.picture {
+        check_extension(path)?;
     }
     let written = [("the commands (--output)", &args.output), ("the picture (--picture)", &args.picture)];
     let written: Vec<_> = written.iter().filter_map(|(what, path)| Some((*what, path.as_deref()?))).collect();
@@ -130,12 +135,12 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let sky = Equirect::procedural_sky();
     let mut session = Session::new(&gpu, size, &sky).map_err(|e| on_device(e.into()))?;
     let frames = frames(args, &mut session, size, edge);
-    let picture = session.picture();
+    let picture = args.picture.as_ref().map(|path| Ok((path, session.picture()?)));
     session.end();
     let frames = frames.map_err(&on_device)?;
     print(args, size, edge, &frames)?;
-    if let Some(path) = &args.picture {
-        outputs::write(path, &encode_picture(path, size, &picture?)?)?;
+    if let Some((path, picture)) = picture.transpose().map_err(on_device)? {
+        outputs::write(path, &encode_picture(path, size, &picture)?)?;
         line(format!("wrote {}", path.display()))?;
     }
     if let Some(path) = &args.output {
@@ -200,7 +205,7 @@ fn print(args: &Args, size: [u32; 2], edge: u32, frames: &[Frame]) -> Result<(),
         "workload {name}: {}x{} pixels, {} particles, {FRAMES} frames, method {}; one queue, no extensions, no optional features",
         size[0],
         size[1],
-        2 * edge * edge * edge,
+        count(edge),
         args.method
     ))?;
     line("")?;
@@ -237,6 +242,6 @@ fn tree(args: &Args, size: [u32; 2], edge: u32, frames: &[Frame], gpu: &Gpu) -> 
         .collect();
     json!({
         "device": gpu.info.name, "driver": gpu.info.driver, "commit": report::COMMIT, "size": size,
-        "particles": 2 * edge * edge * edge, "method": args.method, "frames": frames,
+        "particles": count(edge), "method": args.method, "frames": frames,
     })
 }

@@ -1,4 +1,5 @@
-//! BGEO files (`.bgeo`), classic version 5: big-endian; points come first, primitives and the rest are not looked at.
+//! BGEO files (`.bgeo`), plain or packed: classic version 5, big-endian, of which points come first and primitives and the rest are not
+//! looked at; and what Houdini has written since version 12 (`bgeo_json.rs`, `bgeo_points.rs`).
 //!
 //! Own code: the one crate that reads BGEO panics on vectors of floats or integers, which Partio writes.
 
@@ -7,8 +8,9 @@ use std::io::{BufReader, Read};
 use flate2::bufread::MultiGzDecoder;
 use glam::DVec3;
 
+use super::bgeo_json::{Parser, broken};
 use super::source::{Input, Source, is_id, is_velocity};
-use super::{At, ParticleFile, ReadError};
+use super::{At, ParticleFile, ReadError, bgeo_points, scf};
 use crate::io::budget::Metered;
 use crate::io::quote::quote;
 
@@ -19,30 +21,41 @@ const WORDS: usize = 1 << 16;
 
 /// Reads the positions, the integer attribute `class` and velocities.
 pub(super) fn read(source: &Source<'_>, mut input: &mut dyn Input) -> Result<ParticleFile, ReadError> {
-    let packed = input.fill_buf().map_err(|error| source.broken("reading", error))?.starts_with(&[0x1f, 0x8b]);
-    if packed {
+    let begin = input.fill_buf().map_err(|error| source.broken("reading", error))?;
+    if begin.starts_with(&[0x1f, 0x8b]) {
         source.note(|notes| notes.compression = Some("gzip".into()));
-        let inner = MultiGzDecoder::new(input);
-        let mut stream = BufReader::new(Metered { inner, ledger: source.ledger, what: "the unpacked gzip stream" });
-        let file = read_points(source, &mut stream, None)?;
-        // gzip's checksum is at its end.
-        std::io::copy(&mut stream, &mut std::io::sink()).map_err(|error| source.broken("gzip", error))?;
-        return Ok(file);
+        return read_packed(source, MultiGzDecoder::new(input), "the unpacked gzip stream");
+    }
+    if begin.starts_with(scf::MAGIC) {
+        source.note(|notes| notes.compression = Some("Blosc".into()));
+        let inner = scf::Unpacked::new(input, source).map_err(|error| broken(source, error))?;
+        return read_packed(source, inner, "the unpacked chunks");
     }
     read_points(source, &mut input, Some(source.size))
 }
 
+fn read_packed(source: &Source<'_>, inner: impl Read, what: &str) -> Result<ParticleFile, ReadError> {
+    let mut stream = BufReader::new(Metered { inner, ledger: source.ledger, what });
+    let file = read_points(source, &mut stream, None)?;
+    // gzip's checksum is at its end, and so is the index of chunks.
+    std::io::copy(&mut stream, &mut std::io::sink()).map_err(|error| broken(source, error))?;
+    Ok(file)
+}
+
 /// `length` is that of the whole stream, if it is known.
 fn read_points(source: &Source<'_>, stream: &mut impl Read, length: Option<u64>) -> Result<ParticleFile, ReadError> {
-    let broken = |error: std::io::Error| match error.kind() {
-        std::io::ErrorKind::UnexpectedEof => source.malformed(At::Unknown, "the file ends within its points"),
-        _ => source.broken("gzip", error),
-    };
-    if take(stream).map_err(broken)? != *b"Bgeo" {
+    let broken = |error: std::io::Error| broken(source, error);
+    let begin = take(stream).map_err(broken)?;
+    if begin[0] == 0x7f
+        && let Some(mut parser) = Parser::new(begin, &mut *stream, source)?
+    {
+        return bgeo_points::read(source, &mut parser);
+    }
+    if begin != *b"Bgeo" {
         return Err(source.malformed_but(
             At::Byte(0),
-            "`Bgeo` expected",
-            "export it as classic BGEO (version 5), as Partio and SPlisHSPlasH do",
+            "geometry by Houdini, or `Bgeo`, expected",
+            "export it as .bgeo, as Houdini, Partio and SPlisHSPlasH do",
         ));
     }
     let [version_char] = take(stream).map_err(broken)?;

@@ -14,15 +14,16 @@ const GAP: f64 = 1.0;
 pub fn of(runs: &[Run], device: &str) -> Result<Vec<u8>, serde_json::Error> {
     let mut events = Vec::new();
     for (process, run) in runs.iter().enumerate() {
-        let name = format!("{}, {}", run.scene, run.method);
-        events.push(json!({"ph": "M", "name": "process_name", "pid": process, "tid": DEVICE, "args": {"name": name}}));
-        events.push(json!({"ph": "M", "name": "thread_name", "pid": process, "tid": DEVICE, "args": {"name": device}}));
+        let mut label = |what: &str, thread: u32, name: &str| {
+            events.push(json!({"ph": "M", "name": what, "pid": process, "tid": thread, "args": {"name": name}}));
+        };
+        label("process_name", DEVICE, &format!("{}, {}", run.scene, run.method));
+        label("thread_name", DEVICE, device);
         let known = run.on_host.len() == run.frames.len();
         let starts = if known { starts_on_host(&run.on_host) } else { starts(&run.frames) };
         let mut zones: Vec<_> = starts.into_iter().zip(&run.frames).flat_map(zones).collect();
         if known {
-            let args = json!({"name": "host"});
-            events.push(json!({"ph": "M", "name": "thread_name", "pid": process, "tid": HOST, "args": args}));
+            label("thread_name", HOST, "host");
             zones.extend(host_zones(&run.on_host));
         }
         zones.sort_by(|a, b| a.begin.total_cmp(&b.begin).then(b.ms.total_cmp(&a.ms)));
@@ -47,6 +48,8 @@ fn starts(frames: &[FrameTimes]) -> Vec<f64> {
 
 const DEVICE: u32 = 0;
 const HOST: u32 = 1;
+/// Kind of the zones of that thread.
+const ON_HOST: &str = "host";
 
 fn ms(from: Instant, to: Instant) -> f64 {
     1e3 * to.duration_since(from).as_secs_f64()
@@ -63,8 +66,7 @@ fn host_zones(frames: &[OnHost]) -> Vec<Zone> {
         let s = f.stages;
         let zone = |name: &str, from, to| Zone {
             name: name.into(),
-            kind: "host",
-            thread: HOST,
+            kind: ON_HOST,
             begin: ms(frames[0].stages.begin, from),
             ms: ms(from, to),
         };
@@ -80,7 +82,6 @@ fn host_zones(frames: &[OnHost]) -> Vec<Zone> {
 struct Zone {
     name: String,
     kind: &'static str,
-    thread: u32,
     begin: f64,
     ms: f64,
 }
@@ -88,22 +89,22 @@ struct Zone {
 impl Zone {
     fn event(&self, process: usize) -> Value {
         let (ts, dur) = (1e3 * self.begin, 1e3 * self.ms);
-        json!({"ph": "X", "name": self.name, "cat": self.kind, "pid": process, "tid": self.thread, "ts": ts, "dur": dur})
+        let thread = if self.kind == ON_HOST { HOST } else { DEVICE };
+        json!({"ph": "X", "name": self.name, "cat": self.kind, "pid": process, "tid": thread, "ts": ts, "dur": dur})
     }
 }
 
 /// Of one frame: itself, runs of passes of one part, and passes.
 fn zones((start, frame): (f64, &FrameTimes)) -> Vec<Zone> {
-    let mut all = vec![Zone { name: "frame".into(), kind: "frame", thread: DEVICE, begin: start, ms: frame.span_ms }];
+    let mut all = vec![Zone { name: "frame".into(), kind: "frame", begin: start, ms: frame.span_ms }];
     let end = |p: &PassTime| p.begin_ms + p.ms;
     for passes in frame.passes.chunk_by(|a, b| a.part == b.part) {
         let (begin, part) = (passes[0].begin_ms, passes[0].part);
         let last = passes.iter().map(end).fold(begin, f64::max);
-        all.push(Zone { name: part.into(), kind: "part", thread: DEVICE, begin: start + begin, ms: last - begin });
+        all.push(Zone { name: part.into(), kind: "part", begin: start + begin, ms: last - begin });
         all.extend(passes.iter().map(|p| Zone {
             name: p.name.clone(),
             kind: "pass",
-            thread: DEVICE,
             begin: start + p.begin_ms,
             ms: p.ms,
         }));

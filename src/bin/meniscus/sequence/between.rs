@@ -17,6 +17,11 @@ pub enum BetweenError {
          they are", file.display(), next.display()
     )]
     Count { file: PathBuf, count: usize, next: PathBuf, next_count: usize },
+    #[error(
+        "{} and {} have as many particles, but others: of id {id} only one has one, so that none can be followed. Leave out --step, which \
+         takes frames as they are", file.display(), next.display()
+    )]
+    Others { file: PathBuf, next: PathBuf, id: u64 },
     #[error("{}: has no velocities, by which particles get from frame to frame. Export them, or leave out --step", .0.display())]
     NoVelocities(PathBuf),
     #[error("{}: particles were left out of it (--drop-invalid), so that none can be followed. Leave out --step", .0.display())]
@@ -108,6 +113,12 @@ pub fn between(
     if count != next_count {
         let (file, next) = (first.file.clone(), second.file.clone());
         return Err(BetweenError::Count { file, count, next, next_count });
+    }
+    // In the order of their ids, where these differ.
+    let ids = a.ids.as_deref().unwrap_or_default().iter().zip(b.ids.as_deref().unwrap_or_default());
+    if let Some((id, other)) = ids.into_iter().find(|(id, other)| id != other) {
+        let (file, next) = (first.file.clone(), second.file.clone());
+        return Err(BetweenError::Others { file, next, id: *id.min(other) });
     }
     let velocities = |frame: &Frame, file: &'_ ParticleFile| {
         file.velocities.is_some().then_some(()).ok_or_else(|| BetweenError::NoVelocities(frame.file.clone()))

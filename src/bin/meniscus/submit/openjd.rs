@@ -18,18 +18,15 @@ pub fn files(job: &Job) -> Result<Engined, SubmitError> {
         arguments.extend(command.into_iter().skip(1));
         json!({"actions": {"onRun": {"command": "sh", "args": arguments}}})
     };
-    let parameter = |name: &str, object: &str, default: &str, about: &str| {
-        json!({
-            "name": name, "type": "PATH", "objectType": object, "dataFlow": "NONE", "default": default,
-            "description": about,
-        })
-    };
+    // Without defaults: those of paths must be relative, and are taken from the template's folder.
+    let parameter = |name: &str, object: &str, about: &str| json!({"name": name, "type": "PATH", "objectType": object, "dataFlow": "NONE", "description": about});
+    let values = json!({"Program": job.program, "Folder": job.folder});
     let template = json!({
         "specificationVersion": "jobtemplate-2023-09",
         "name": "meniscus",
         "parameterDefinitions": [
-            parameter("Program", "FILE", &job.program, "meniscus"),
-            parameter("Folder", "DIRECTORY", &job.folder, "What the command's files are named from"),
+            parameter("Program", "FILE", "meniscus"),
+            parameter("Folder", "DIRECTORY", "What the command's files are named from"),
         ],
         "steps": [
             {
@@ -43,8 +40,10 @@ pub fn files(job: &Job) -> Result<Engined, SubmitError> {
         ],
     });
     Ok(Engined {
-        files: vec![("template.json", format!("{template:#}\n"))],
-        submit: "exec openjd run template.json --step Join --run-dependencies \"$@\"".to_owned(),
+        files: vec![("template.json", format!("{template:#}\n")), ("parameters.json", format!("{values:#}\n"))],
+        submit:
+            "exec openjd run template.json --job-param file://parameters.json --step Join --run-dependencies \"$@\""
+                .to_owned(),
         by: "openjd",
         package: "openjd-cli (PyPI)",
     })
