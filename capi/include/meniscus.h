@@ -277,7 +277,7 @@ typedef struct {
      */
     VkDeviceSize stride;
     /**
-     * How many there are.
+     * How many there are; with count_buffer how many there may be.
      */
     uint32_t count;
     /**
@@ -306,6 +306,15 @@ typedef struct {
      * Bytes from one id to the next; a multiple of 4. 0 stands for 4.
      */
     VkDeviceSize id_stride;
+    /**
+     * How many particles there are, where only the device knows: 32 bits, read when the frame runs; or VK_NULL_HANDLE. What lies
+     * behind so many is not there, whatever it holds. It may be the buffer of the positions.
+     */
+    VkBuffer count_buffer;
+    /**
+     * Where that number lies, in bytes; a multiple of 4.
+     */
+    VkDeviceSize count_offset;
 } MeniscusPositions;
 
 /**
@@ -430,13 +439,21 @@ typedef struct {
      */
     VkDeviceSize before_stride;
     /**
-     * How many particles; 0: the liquid stands still, and only the camera moves.
+     * How many particles, with count_buffer how many there may be; 0: the liquid stands still, and only the camera moves.
      */
     uint32_t count;
     /**
      * Seconds since the frame before, that velocities count for; 0 where `before` holds positions.
      */
     float seconds;
+    /**
+     * How many particles there are, where only the device knows: 32 bits; or VK_NULL_HANDLE. Read in vertex shaders.
+     */
+    VkBuffer count_buffer;
+    /**
+     * Where that number lies, in bytes; a multiple of 4.
+     */
+    VkDeviceSize count_offset;
 } MeniscusMotion;
 
 /**

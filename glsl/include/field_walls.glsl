@@ -108,18 +108,22 @@ bool meets_ball(vec3 center, vec3 x, vec3 dir, out vec2 t) {
     return square > 0.0;
 }
 
-// The first of a brick's balls around a place, if there is one; on its sphere does not count.
+// One of a brick's balls around a place, if there is one; on its sphere does not count. Of several always the same: they are listed in
+// the order in which the device came to them, which is another from frame to frame.
 bool ball_around(vec3 x, uint entry, out vec3 center) {
+    const uint none = 0xffffffffu;
     vec3 brick = BRICK_EDGE * floor(x / BRICK_EDGE);
-    bool found = false;
-    for (uint i = 0u; i < FIELD_MOST_BALLS && entry != 0u && !found; ++i) {
+    uint least = none;
+    for (uint i = 0u; i < FIELD_MOST_BALLS && entry != 0u; ++i) {
         uvec2 ball = balls.at[entry - 1u];
-        center = brick + field_ball(ball.x);
-        vec3 q = x - center;
-        found = dot(q, q) < push.ball * push.ball * (1.0 - BALL_ROUNDING);
+        vec3 at = brick + field_ball(ball.x), q = x - at;
+        if (ball.x < least && dot(q, q) < push.ball * push.ball * (1.0 - BALL_ROUNDING)) {
+            least = ball.x;
+            center = at;
+        }
         entry = ball.y;
     }
-    return found;
+    return least != none;
 }
 
 // The first root in a cell, as a part of the ray's way through it, at which h, `side` times the field less its level, falls through

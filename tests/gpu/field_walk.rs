@@ -237,6 +237,26 @@ fn balls_in_the_bodys_face_hand_rays_over() {
     });
 }
 
+/// Balls that overlap are walked through alike in whatever order the device has listed them.
+#[test]
+fn the_order_of_balls_changes_no_bit() {
+    let mut random = Random(5);
+    let positions: Vec<_> = (0..600).map(|_| random.point(Vec3::splat(-0.3), Vec3::splat(0.3))).collect();
+    let case = prepared(&positions, &case(Field::default(), 4, 4));
+    let mut all = points(&Input::new(&positions, case.particles.radius), &Options::default()).expect("valid");
+    all.iter_mut().for_each(|p| p.class = Class::Splash);
+    each_driver(|driver| {
+        let first = driver.shoot_points(&case, &all);
+        assert!(walked(&first).iter().filter(|w| w.pattern != PATTERN_NONE).count() > 2000, "{}", driver.name);
+        for i in 1..4 {
+            let mut other = all.clone();
+            other.rotate_left(150 * i);
+            other[..300].reverse();
+            assert!(driver.shoot_points(&case, &other).picture == first.picture, "{}: {i}", driver.name);
+        }
+    });
+}
+
 /// The same through the device's own points; and with an eye in the liquid, whose rays start there.
 #[test]
 fn an_eye_in_the_liquid_sees_from_within() {
