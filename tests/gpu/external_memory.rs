@@ -8,7 +8,7 @@ use ash::vk;
 use glam::Vec3;
 use meniscus::{
     FrameInput,
-    host::{Gpu, Session, Upload},
+    host::{Gpu, HostError, Session, Upload},
     prepare::DevicePositions,
 };
 
@@ -18,6 +18,9 @@ const SHARED: vk::ExternalMemoryHandleTypeFlags = vk::ExternalMemoryHandleTypeFl
 const USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
     vk::BufferUsageFlags::STORAGE_BUFFER.as_raw() | vk::BufferUsageFlags::TRANSFER_DST.as_raw(),
 );
+
+/// In which stages a buffer is used, and how.
+type Use = (vk::PipelineStageFlags2, vk::AccessFlags2);
 
 fn cloud(seed: u64) -> Vec<Vec3> {
     let mut random = Random(seed);
@@ -66,7 +69,7 @@ impl<'a> Shared<'a> {
     }
 
     /// Takes the buffer from whoever has it outside, or hands it over; `use_of` it: what this device does with it.
-    fn transfer(&self, cmd: vk::CommandBuffer, takes: bool, use_of: (vk::PipelineStageFlags2, vk::AccessFlags2)) {
+    fn transfer(&self, cmd: vk::CommandBuffer, takes: bool, use_of: Use) -> Result<(), HostError> {
         let own = self.gpu.host(1).queue_family;
         let barrier = vk::BufferMemoryBarrier2::default().buffer(self.buffer).size(vk::WHOLE_SIZE);
         let barrier = match takes {
@@ -78,6 +81,7 @@ impl<'a> Shared<'a> {
         let info = vk::DependencyInfo::default().buffer_memory_barriers(&barrier);
         // SAFETY: `cmd` is recording, on a queue of that family.
         unsafe { self.gpu.device.cmd_pipeline_barrier2(cmd, &info) };
+        Ok(())
     }
 
     /// A step of the simulation.
@@ -85,12 +89,11 @@ impl<'a> Shared<'a> {
         let write = (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_WRITE);
         let step = self.gpu.run(|cmd| {
             if !first {
-                self.transfer(cmd, true, write);
+                self.transfer(cmd, true, write)?;
             }
             // SAFETY: `cmd` is recording; the positions fill the buffer.
             unsafe { self.gpu.device.cmd_update_buffer(cmd, self.buffer, 0, bytemuck::cast_slice(positions)) };
-            self.transfer(cmd, false, write);
-            Ok(())
+            self.transfer(cmd, false, write)
         });
         step.expect("written");
     }
@@ -146,9 +149,9 @@ fn positions_of_another_device() {
         let mut seen = Vec::new();
         for (i, positions) in steps.iter().enumerate() {
             own.write(positions, i == 0);
-            draws.run(|cmd| Ok(imported.transfer(cmd, true, read))).expect("taken");
+            draws.run(|cmd| imported.transfer(cmd, true, read)).expect("taken");
             let found = picture(imported.buffer, positions.len());
-            draws.run(|cmd| Ok(imported.transfer(cmd, false, read))).expect("handed over");
+            draws.run(|cmd| imported.transfer(cmd, false, read)).expect("handed over");
             let usual = Upload::new(&draws, bytemuck::cast_slice(positions)).expect("upload");
             assert!(found == picture(usual.buffer, positions.len()), "{}: step {i}", driver.name);
             seen.push(found);
