@@ -1,6 +1,6 @@
 //! The host's device, borrowed, and what it has to be able to do.
 
-use crate::{Error, memory::MemoryAllocator};
+use crate::{Error, allocator::MemoryAllocator};
 use ash::vk;
 use std::sync::Arc;
 

@@ -32,7 +32,7 @@ pub enum Error {
         /// Size asked for.
         bytes: u64,
         /// The allocator's reason.
-        source: crate::memory::Refusal,
+        source: crate::allocator::Refusal,
     },
     /// More memory than the device has; nothing was allocated.
     #[error(

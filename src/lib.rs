@@ -50,6 +50,7 @@
 #![warn(clippy::undocumented_unsafe_blocks)]
 
 mod access;
+pub mod allocator;
 pub mod auto;
 #[cfg(feature = "inspect")]
 pub mod compiler;
@@ -67,7 +68,6 @@ pub mod inspect;
 #[cfg(feature = "io")]
 pub mod io;
 pub mod layers;
-pub mod memory;
 pub mod method;
 pub mod optics;
 pub mod parameters;

@@ -2,8 +2,8 @@
 
 use crate::{
     Error,
+    allocator::{Location, Memory, Request},
     device::Host,
-    memory::{Location, Memory, Request},
 };
 use ash::vk;
 

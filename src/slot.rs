@@ -1,6 +1,6 @@
 //! What belongs to one of the frames in flight.
 
-use crate::{Error, device::Host, memory::Location, plan::Plan, profile::Profiler, resources::Buffer, scale};
+use crate::{Error, allocator::Location, device::Host, plan::Plan, profile::Profiler, resources::Buffer, scale};
 use ash::vk;
 
 /// What belongs to one of the frames in flight.

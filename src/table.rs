@@ -3,8 +3,8 @@
 use crate::{
     Error,
     access::State,
+    allocator::Location,
     device::Host,
-    memory::Location,
     plan::{Home, Made, Plan},
     resources::{Buffer, Image, Resource, Retired, Spec},
 };

@@ -3,10 +3,10 @@
 use super::{Renderer, SceneBounds};
 use crate::{
     Error, access,
+    allocator::Location,
     environment::{Equirect, footprints},
     frame::Scene,
     layers::{Kind, field::MOST_POINTS},
-    memory::Location,
     particles::{Class, Particles, Point},
     prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},

@@ -1,6 +1,7 @@
 //! Passes on every Vulkan driver there is, against their CPU twins, with core and synchronization validation on.
 
 mod access;
+mod allocator;
 mod analytic;
 mod atlas;
 mod auto;
@@ -25,7 +26,6 @@ mod half;
 mod host;
 mod layers;
 mod lookup;
-mod memory;
 mod methods;
 mod motion;
 mod normals;

@@ -9,9 +9,9 @@ use ash::vk;
 use glam::Vec3;
 use meniscus::{
     Error, FrameInput, Host, Renderer,
+    allocator::{Location, Memory, MemoryAllocator, Refusal, Request},
     host::{Canvas, Gpu, HostError},
     layers::field::Field,
-    memory::{Location, Memory, MemoryAllocator, Refusal, Request},
     prepare,
 };
 use std::{
