@@ -6,7 +6,7 @@
 //!
 //! # The contract
 //!
-//! * [`Renderer`] borrows the host's instance, device and allocator of device memory ([`Host`], [`memory`]); it creates no device, submits
+//! * [`Renderer`] borrows the host's instance, device and allocator of device memory ([`Host`], [`allocator`]); it creates no device, submits
 //!   nothing, waits for nothing and presents nothing. It needs Vulkan 1.3 with `dynamicRendering` and
 //!   `synchronization2` enabled, and one queue family with graphics and compute; see [`device`].
 //! * [`Renderer::record`] records one frame, `src/frame.rs` is that frame from top to bottom.
