@@ -5,7 +5,7 @@ mod surface;
 
 use crate::{
     Error,
-    prepare::{DeviceCount, DevicePositions},
+    prepare::DevicePositions,
     settings::{Camera, Settings},
 };
 use ash::vk;
@@ -191,13 +191,8 @@ impl<'a> FrameInput<'a> {
         if self.positions.is_some_and(|p| p.count > 0 && p.buffer == vk::Buffer::null()) {
             return Err(Error::parameter("buffer of positions", "null", "give the buffer that holds them"));
         }
-        let counted_by = |c: DeviceCount| c.buffer == vk::Buffer::null();
-        if self.positions.is_some_and(|p| p.count > 0 && p.device_count.is_some_and(counted_by)) {
-            return Err(Error::parameter(
-                "buffer of the particle count",
-                "null",
-                "give the buffer that holds it, or None",
-            ));
+        if let Some(count) = self.positions.filter(|p| p.count > 0).and_then(|p| p.device_count) {
+            count.check(["buffer of the particle count", "offset of the particle count"])?;
         }
         if self.positions.is_some_and(|p| p.count > 0 && p.ids.is_some_and(|ids| ids.buffer == vk::Buffer::null())) {
             return Err(Error::parameter("buffer of ids", "null", "give the buffer that holds them, or no ids"));

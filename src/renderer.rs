@@ -242,11 +242,11 @@ impl Renderer {
     /// * `cmd` is recording, outside rendering, and goes to a queue of the family in [`Host`], after all frames
     ///   recorded before it.
     /// * The frame last recorded into `input.slot` has completed on the device.
-    /// * The buffer of [`FrameInput::positions`], and those of their number and of their ids if they have any, are alive until the frame has
-    ///   completed, hold what is said of them, have usage `STORAGE_BUFFER`, and their earlier writes are visible to reads
-    ///   in compute shaders. What is written there later waits for the frame's compute shaders.
-    /// * The buffers of [`crate::MovingParticles`], that of their number too if they have one, are alive until the frame has completed, have usage `STORAGE_BUFFER`, and their earlier
-    ///   writes are visible to reads in vertex shaders.
+    /// * The buffer of [`FrameInput::positions`], and those of their number and of their ids if they have any, are alive until the
+    ///   frame has completed, hold what is said of them, have usage `STORAGE_BUFFER`, and their earlier writes are visible to
+    ///   reads in compute shaders. What is written there later waits for the frame's compute shaders.
+    /// * The buffers of [`crate::MovingParticles`], that of their number too if they have one, are alive until the frame has
+    ///   completed, have usage `STORAGE_BUFFER`, and their earlier writes are visible to reads in vertex shaders.
     /// * The output, and what there is of the scene, of an environment of the host's and of [`FrameInput::surface`], are alive until
     ///   the frame has completed and in the stated layouts; all but the environment have the view in
     ///   them, whole, where it is said to begin. Their earlier writes are

@@ -31,11 +31,12 @@ pub struct Gpu<'a> {
     pub(super) tools: Tools,
 }
 
-/// Whether a device has an extension.
-fn offers(instance: &Instance, info: &DeviceInfo, name: &CStr) -> Result<bool, HostError> {
+/// Tells whether a device has an extension.
+pub(super) fn extensions(instance: &Instance, info: &DeviceInfo) -> Result<impl Fn(&CStr) -> bool + use<>, HostError> {
     // SAFETY: the physical device is this instance's.
     let known = unsafe { instance.handle.enumerate_device_extension_properties(info.handle) };
-    Ok(known.map_err(vulkan("device extensions"))?.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
+    let known = known.map_err(vulkan("device extensions"))?;
+    Ok(move |name: &CStr| known.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
 }
 
 impl<'a> Gpu<'a> {
@@ -47,7 +48,7 @@ impl<'a> Gpu<'a> {
     /// A device that also tells what its compiler makes of pipelines: see [`crate::compiler`].
     pub fn telling(instance: &'a Instance, info: DeviceInfo) -> Result<Gpu<'a>, HostError> {
         let name = compiler::EXTENSION;
-        if !offers(instance, &info, name)? {
+        if !extensions(instance, &info)?(name) {
             return Err(compiler::not_told(info.name).into());
         }
         let mut tells =
@@ -73,7 +74,7 @@ impl<'a> Gpu<'a> {
     /// A device that also shares memory with others by file descriptors; none where the driver has no `VK_KHR_external_memory_fd`.
     pub fn importing(instance: &'a Instance, info: DeviceInfo) -> Result<Option<Gpu<'a>>, HostError> {
         let name = ash::khr::external_memory_fd::NAME;
-        if !offers(instance, &info, name)? {
+        if !extensions(instance, &info)?(name) {
             return Ok(None);
         }
         Gpu::with(instance, info, &[name.as_ptr()], vk::DeviceCreateInfo::default(), false).map(Some)

@@ -1,6 +1,6 @@
 //! What profilers and capturing tools like a host to say: where a frame ends, and what time it is on the device's clock.
 
-use super::{Gpu, HostError, Instance, vulkan};
+use super::{Gpu, HostError, Instance, gpu::extensions, vulkan};
 use ash::vk;
 use std::{
     cell::Cell,
@@ -81,17 +81,14 @@ impl<'a> Gpu<'a> {
     /// A device that also says what tools like to know, where it offers that: where frames end (`VK_EXT_frame_boundary`), and
     /// its time on the host's clock ([`Gpu::calibrate`]).
     pub fn profiled(instance: &'a Instance, info: super::DeviceInfo) -> Result<Gpu<'a>, HostError> {
-        // SAFETY: the physical device is this instance's.
-        let known = unsafe { instance.handle.enumerate_device_extension_properties(info.handle) };
-        let known = known.map_err(vulkan("device extensions"))?;
-        let has = |name: &CStr| known.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let has = extensions(instance, &info)?;
         let clocks = [ash::khr::calibrated_timestamps::NAME, ash::ext::calibrated_timestamps::NAME];
         let clock = clocks.into_iter().find(|name| info.timestamps && has(name));
         let boundary = ash::ext::frame_boundary::NAME;
         let mut feature = vk::PhysicalDeviceFrameBoundaryFeaturesEXT::default();
         if has(boundary) {
             let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut feature);
-            // SAFETY: as above; the chain lives on this stack frame.
+            // SAFETY: the physical device is this instance's; the chain lives on this stack frame.
             unsafe { instance.handle.get_physical_device_features2(info.handle, &mut all) };
         }
         let marks = feature.frame_boundary == vk::TRUE;

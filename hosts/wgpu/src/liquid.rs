@@ -56,6 +56,7 @@ pub struct Liquid {
     renderer: Option<Renderer>,
     places: Vec<Place>,
     next: usize,
+    raw: ash::Device,
     // Last: everything above is of this device.
     device: wgpu::Device,
 }
@@ -75,27 +76,28 @@ impl Liquid {
         let other = || Error::NotVulkan(adapter.get_info().backend.to_str());
         // SAFETY: nothing of adapter and device is destroyed, and the clone of the device, which is dropped last, keeps them
         // alive.
-        let (host, format) = unsafe {
+        let (host, raw, format) = unsafe {
             let format = adapter.as_hal::<Vulkan>().ok_or_else(other)?.texture_format_as_raw(output);
             let raw = device.as_hal::<Vulkan>().ok_or_else(other)?;
             let (instance, physical) = (raw.shared_instance().raw_instance().clone(), raw.raw_physical_device());
+            let device = raw.raw_device().clone();
             let allocator = Allocator::new(&AllocatorCreateDesc {
                 instance: instance.clone(),
-                device: raw.raw_device().clone(),
+                device: device.clone(),
                 physical_device: physical,
                 debug_settings: Default::default(),
                 buffer_device_address: false,
                 allocation_sizes: Default::default(),
             })?;
             let allocator = Arc::new(Mutex::new(allocator));
-            let mut host = Host::new(instance, raw.raw_device().clone(), physical, raw.queue_family_index(), allocator);
+            let mut host = Host::new(instance, device.clone(), physical, raw.queue_family_index(), allocator);
             host.frames_in_flight = frames_in_flight;
-            (host, format)
+            (host, device, format)
         };
         // SAFETY: the handles live as said above; the features are enabled, by this function's contract.
         let renderer = unsafe { Renderer::new(host, format) }?;
         let places = (0..frames_in_flight).map(|_| Place::default()).collect();
-        Ok(Liquid { renderer: Some(renderer), places, next: 0, device: device.clone() })
+        Ok(Liquid { renderer: Some(renderer), places, next: 0, raw, device: device.clone() })
     }
 
     /// The renderer: particles, points, times, and so on.
@@ -151,13 +153,12 @@ impl Liquid {
         self.renderer().resize([size.width, size.height])?;
         let mut encoder = self.encoder("meniscus");
         let cmd = handle(&mut encoder)?;
-        let device = self.raw_device()?;
         // SAFETY: the command buffer is recording, outside of passes. The views are of this device, and in the layouts of the
         // uses that the first command buffer brings them into; what the caller adds is the caller's.
         unsafe {
-            in_turn(&device, cmd);
+            in_turn(&self.raw, cmd);
             self.renderer().record(cmd, &input)?;
-            in_turn(&device, cmd);
+            in_turn(&self.raw, cmd);
         }
         // Said of the command buffer that holds the frame: submitted alone, the first one is no frame.
         let ticket = self.places[slot].take();
@@ -188,11 +189,6 @@ impl Liquid {
 
     fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
-    }
-
-    fn raw_device(&self) -> Result<ash::Device, Error> {
-        // SAFETY: nothing of the device is destroyed.
-        Ok(unsafe { self.device.as_hal::<Vulkan>() }.ok_or(Error::NoEncoder)?.raw_device().clone())
     }
 }
 

@@ -127,6 +127,13 @@ impl<'a, R: Read> Parser<'a, R> {
         Ok(bytes)
     }
 
+    /// A number of a kind that takes so many bytes.
+    fn number(&mut self, kind: u8, size: usize) -> Result<f64, ReadError> {
+        let mut bytes = [0; 8];
+        self.stream.read_exact(&mut bytes[..size]).map_err(|error| broken(self.source, error))?;
+        Ok(number(kind, self.big, &bytes[..size]))
+    }
+
     fn pass(&mut self, length: u64) -> Result<(), ReadError> {
         match std::io::copy(&mut (&mut self.stream).take(length), &mut std::io::sink()) {
             Ok(passed) if passed == length => Ok(()),
@@ -144,8 +151,7 @@ impl<'a, R: Read> Parser<'a, R> {
             0xf8 => (INT64, 8),
             _ => return Err(self.wrong(format!("a length begins with {first:#x}"))),
         };
-        let bytes: Vec<u8> = (0..size).map(|_| self.bytes::<1>().map(|[byte]| byte)).collect::<Result<_, _>>()?;
-        let length = number(kind, self.big, &bytes);
+        let length = self.number(kind, size)?;
         if length < 0.0 { Err(self.wrong("a length is negative")) } else { Ok(length as u64) }
     }
 
@@ -207,12 +213,8 @@ impl<'a, R: Read> Parser<'a, R> {
     pub(super) fn count(&mut self) -> Result<Option<usize>, ReadError> {
         let kind = self.kind()?;
         let Some(size) = size(kind) else { return self.rest_of(kind, 0).map(|()| None) };
-        let bytes: [u8; 8] = {
-            let mut all = [0; 8];
-            self.stream.read_exact(&mut all[..size]).map_err(|error| broken(self.source, error))?;
-            all
-        };
-        Ok(super::source::whole_number(number(kind, self.big, &bytes[..size])).and_then(|n| usize::try_from(n).ok()))
+        let number = self.number(kind, size)?;
+        Ok(super::source::whole_number(number).and_then(|n| usize::try_from(n).ok()))
     }
 
     /// All elements of an array.
@@ -283,10 +285,9 @@ impl<'a, R: Read> Parser<'a, R> {
                 }
                 kind => {
                     let Some(size) = size(kind) else { return Err(self.wrong("a number expected")) };
-                    let mut bytes = [0; 8];
-                    self.stream.read_exact(&mut bytes[..size]).map_err(|error| broken(self.source, error))?;
+                    let number = self.number(kind, size)?;
                     self.source.hold(1, 16, "numbers")?;
-                    all.push(number(kind, self.big, &bytes[..size]));
+                    all.push(number);
                 }
             }
         }
