@@ -2,12 +2,7 @@
 //! made for that alone and run nothing, so that hardware which is not there (Mesa's null hardware) serves as well.
 
 use crate::{
-    Error, Host, Settings,
-    device::name,
-    frame::{self, Scene},
-    pipeline::Pipeline,
-    plan::Recipe,
-    renderer::Amount,
+    Error, Host, Settings, device::name, frame, pipeline::Pipeline, plan::Recipe, renderer::Amount, scene::Scene,
 };
 use ash::{khr::pipeline_executable_properties as executables, vk};
 use std::ffi::CStr;

@@ -203,3 +203,12 @@ pub(crate) fn set_name<H: vk::Handle>(utils: Option<&ash::ext::debug_utils::Devi
         let _ = unsafe { utils.set_debug_utils_object_name(&info) };
     }
 }
+
+/// No device asks for more alignment of a storage buffer's offset.
+pub(crate) const BINDING_ALIGNMENT: u64 = 256;
+
+/// What is bound of a host's buffer that has so many bytes for each of one or more particles: from where on, and how much.
+pub(crate) fn bound(buffer: vk::Buffer, offset: u64, stride: u64, bytes: u64, count: u32) -> (vk::Buffer, u64, u64) {
+    let begin = offset % BINDING_ALIGNMENT;
+    (buffer, offset - begin, begin + stride * u64::from(count - 1) + bytes)
+}

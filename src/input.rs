@@ -9,6 +9,7 @@ use crate::{
     settings::{Camera, Settings},
 };
 use ash::vk;
+pub(crate) use motion::Moves;
 pub use motion::{Before, DeviceVectors, Motion, MovingParticles};
 #[cfg(feature = "host")]
 pub(crate) use surface::has_depth_and_stencil;

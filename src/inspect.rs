@@ -2,18 +2,8 @@
 //! it to draw; the feature `inspect` brings it, with the CPU twins and the tables of shaders.
 
 use crate::{
-    Camera, Error, Renderer, Settings,
-    frame::Scene,
-    layers::Surfaces,
-    passes::shape::COUNTED,
-    plan::{COUNTERS, Plan},
-    prepare::Report,
-    recorder::PlanEntry,
-    resources::Resource,
-    scale::Scale,
-    shader::Frame,
-    space::Space,
-    statistics::PassStatistics,
+    Camera, Error, Renderer, Settings, passes::shape::COUNTED, plan::COUNTERS, prepare::Report, recorder::PlanEntry,
+    resources::Resource, scale::Scale, scene::Scene, shader::Frame, space::Space, statistics::PassStatistics,
 };
 pub use crate::{
     access::{Access, Barrier, State},
@@ -21,6 +11,7 @@ pub use crate::{
         lookup::{Lookup, Mode, twin as lookup},
         walk::Walk,
     },
+    plan::SurfaceNames,
     resources::{ImageSpec, Spec},
 };
 use ash::vk;
@@ -67,32 +58,6 @@ pub fn report(counters: &[(&str, u32)]) -> Report {
     let count = |name| counters.iter().find(|c| c.0 == name).map_or(0, |c| c.1 as usize);
     let [splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio, _] = COUNTED.map(count);
     Report { splash, body, few_neighbours, degenerate, clamped_long, clamped_ratio, ..Report::default() }
-}
-
-/// Targets that hold the liquid's surfaces as light meets them: the body's after smoothing. `None` where the frame has none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct SurfaceNames {
-    /// Depths of the splashes.
-    pub splash_depth: Option<&'static str>,
-    /// Normals of the splashes.
-    pub splash_normal: Option<&'static str>,
-    /// Depths of the body.
-    pub body_depth: Option<&'static str>,
-    /// Normals of the body.
-    pub body_normal: Option<&'static str>,
-}
-
-impl SurfaceNames {
-    pub(crate) fn new(plan: &Plan, surfaces: &Surfaces) -> SurfaceNames {
-        let name = |target| plan.resource(target).name;
-        SurfaceNames {
-            splash_depth: surfaces.splash.map(|s| name(s.depth)),
-            splash_normal: surfaces.splash.map(|s| name(s.normal)),
-            body_depth: surfaces.body.map(|s| name(s.depth)),
-            body_normal: surfaces.body.map(|s| name(s.normal)),
-        }
-    }
 }
 
 /// The block that shaders read; see [`Camera`].

@@ -81,6 +81,7 @@ mod recorder;
 pub mod renderer;
 mod resources;
 mod scale;
+mod scene;
 pub mod settings;
 #[cfg(not(feature = "inspect"))]
 mod shader;

@@ -5,16 +5,17 @@ mod uploads;
 
 use crate::{
     Error, access,
-    device::{self, Host, Limits},
-    frame::{self, Kept, Scene},
+    device::{self, BINDING_ALIGNMENT, Host, Limits, bound},
+    frame,
     input::FrameInput,
     pipeline::Pipelines,
     plan::{Home, Made, Plan},
-    prepare::DevicePositions,
+    prepare::{DevicePositions, Kept},
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder},
     resources::{Buffer, Resource, Retired, Spec},
     scale::Scale,
+    scene::Scene,
     slot::Slot,
     space::{self, Space},
     table::Table,
@@ -57,7 +58,7 @@ pub struct Renderer {
     pub(crate) inspection: crate::inspect::Inspection,
     /// Where the last frame's surfaces are.
     #[cfg(feature = "inspect")]
-    pub(crate) surfaces: crate::inspect::SurfaceNames,
+    pub(crate) surfaces: crate::plan::SurfaceNames,
     /// Names of the last frame's counters.
     #[cfg(feature = "inspect")]
     pub(crate) counters: [Vec<&'static str>; 2],
@@ -98,7 +99,7 @@ impl Renderer {
     /// * The device was created with [`device::required_features`], and with `largePoints` if `host` says so.
     pub unsafe fn new(host: Host, output: vk::Format) -> Result<Renderer, Error> {
         device::check(&host.instance, host.physical_device, host.queue_family)?;
-        if crate::optics::walk::takes_linear(output).is_none() {
+        if crate::scene::takes_linear(output).is_none() {
             let remedy = "use an RGBA float, UNORM or sRGB format";
             return Err(Error::parameter("output format", format!("{output:?}"), remedy));
         }
@@ -183,7 +184,9 @@ impl Renderer {
             Amount::OnDevice(p).fill(&mut scene)?;
         }
         if let Some(motion) = &input.surface.motion {
-            motion.fill(&mut scene, input.camera);
+            let radius = scene.space.radius;
+            scene.motions = motion.uniforms(radius, input.camera);
+            scene.moves = motion.moves(radius, input.camera);
         }
         #[cfg(feature = "inspect")]
         self.inspection.apply(&mut scene);
@@ -468,12 +471,3 @@ const MOST_SLOTS: u32 = 256;
 
 /// How far the eye may be, in particle radii.
 const FARTHEST_EYE: f32 = 1e12;
-
-/// No device asks for more alignment of a storage buffer's offset.
-pub(crate) const BINDING_ALIGNMENT: u64 = 256;
-
-/// What is bound of a host's buffer that has so many bytes for each of one or more particles: from where on, and how much.
-pub(crate) fn bound(buffer: vk::Buffer, offset: u64, stride: u64, bytes: u64, count: u32) -> (vk::Buffer, u64, u64) {
-    let begin = offset % BINDING_ALIGNMENT;
-    (buffer, offset - begin, begin + stride * u64::from(count - 1) + bytes)
-}

@@ -3,9 +3,8 @@
 use super::surface::SurfaceOutput;
 use crate::{
     Camera, Error,
-    frame::{Moves, Scene},
+    device::{BINDING_ALIGNMENT, bound},
     prepare::{DeviceCount, Words},
-    renderer::{BINDING_ALIGNMENT, bound},
     shader::{Motions, Moving},
 };
 use ash::vk;
@@ -155,6 +154,18 @@ impl MovingParticles {
     }
 }
 
+/// Particles that move, as the pass is told of them.
+#[derive(Clone, Copy)]
+pub(crate) struct Moves {
+    /// That there may be.
+    pub count: u32,
+    /// Whether the device knows how many there are.
+    pub counted: bool,
+    /// Whether their velocities are known, or where they were.
+    pub velocities: bool,
+    pub block: Moving,
+}
+
 impl Motion {
     fn moving(&self) -> Option<MovingParticles> {
         self.particles.filter(|p| p.count > 0)
@@ -169,21 +180,24 @@ impl Motion {
         self.moving().map(bound).unwrap_or_default()
     }
 
-    /// Puts it into a scene that this camera sees.
-    pub(crate) fn fill(&self, scene: &mut Scene, camera: &Camera) {
-        let radius = scene.space.radius;
-        let view = camera.view.as_dmat4();
-        let then = self.previous_projection.as_dmat4() * self.previous_view.as_dmat4() * view.inverse();
+    /// How the camera has moved since, where the liquid's unit is so long.
+    pub(crate) fn uniforms(&self, radius: f64, camera: &Camera) -> Motions {
+        let then =
+            self.previous_projection.as_dmat4() * self.previous_view.as_dmat4() * camera.view.as_dmat4().inverse();
         let then = then * DMat4::from_scale(DVec3::splat(radius));
         let p = &self.projection;
-        scene.motions = Motions {
+        Motions {
             then_x: then.row(0).as_vec4(),
             then_y: then.row(1).as_vec4(),
             then_w: then.row(3).as_vec4(),
             now: Vec4::new(p.x_axis.x, p.y_axis.y, -p.z_axis.x, -p.z_axis.y),
-        };
-        scene.moves = self.moving().map(|p| {
-            let eye = DMat4::from_scale(DVec3::splat(radius.recip())) * view;
+        }
+    }
+
+    /// And what has moved before it.
+    pub(crate) fn moves(&self, radius: f64, camera: &Camera) -> Option<Moves> {
+        self.moving().map(|p| {
+            let eye = DMat4::from_scale(DVec3::splat(radius.recip())) * camera.view.as_dmat4();
             let (before, seconds) = p.vectors();
             let count_word = p.device_count.map_or(0, |c| c.word(BINDING_ALIGNMENT));
             let block = Moving {
@@ -196,7 +210,7 @@ impl Motion {
                 seconds: seconds.unwrap_or_default(),
             };
             Moves { count: p.count, counted: p.device_count.is_some(), velocities: seconds.is_some(), block }
-        });
+        })
     }
 
     /// What can be told without using it; `largest` is the largest storage buffer.

@@ -10,12 +10,12 @@ use super::{
 };
 use crate::{
     Error,
-    frame::Scene,
     method::Offers,
     parameters::parameters,
     passes::{Points, per_particle},
     plan::{Blend, Call, Plan, Rendering, Vertices},
     resources::ImageSpec,
+    scene::Scene,
     shader::{
         DENSE_GRID_CORNER_COMP, DENSE_GRID_EMPTY, DENSE_GRID_FRAG, DENSE_GRID_GATHER_COMP, DENSE_GRID_VERT,
         FIELD_BALLS_COMP, FIELD_BRICK,

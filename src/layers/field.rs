@@ -6,12 +6,12 @@ pub mod twin;
 
 use super::{Filling, Kind, Layering};
 use crate::{
-    frame::Scene,
     method::Offers,
     parameters::parameters,
     passes::{Points, per_particle},
     plan::{Call, Groups, Plan, Target},
     prepare::rest_density,
+    scene::Scene,
     shader::{
         FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_MARK_COMP, FIELD_MOST_BRICKS,
         FIELD_NODE_WORDS, FIELD_NODES, FIELD_NUMBER_COMP, FIELD_ONE, FIELD_RECORD, FIELD_SCATTER_COMP, FIELD_SLOT,

@@ -10,11 +10,11 @@ use super::{
     split::BODY,
 };
 use crate::{
-    frame::Scene,
     method::Offers,
     parameters::parameters,
     passes::Drawn,
     plan::{Blend, Call, External, Plan, Rendering},
+    scene::Scene,
     shader::{SIDE_FRONT, SPEED_FRAG, THICKNESS_FRAG},
 };
 use ash::vk::{CompareOp, Format};

@@ -8,12 +8,12 @@ mod splat;
 pub mod split;
 
 use crate::{
-    frame::Scene,
     method::Offers,
     optics::tiles::Tiles,
     parameters::family,
     passes::{Drawn, Points},
     plan::{Plan, Target},
+    scene::Scene,
 };
 
 family! {
@@ -112,6 +112,20 @@ pub(crate) struct Surfaces {
     pub tiles: Option<Tiles>,
     /// Where the surface is that of a density field.
     pub field: Option<field::Volume>,
+}
+
+#[cfg(feature = "inspect")]
+impl Surfaces {
+    /// What its targets are called.
+    pub fn names(&self, plan: &Plan) -> crate::plan::SurfaceNames {
+        let name = |target| plan.resource(target).name;
+        crate::plan::SurfaceNames {
+            splash_depth: self.splash.map(|s| name(s.depth)),
+            splash_normal: self.splash.map(|s| name(s.normal)),
+            body_depth: self.body.map(|s| name(s.depth)),
+            body_normal: self.body.map(|s| name(s.normal)),
+        }
+    }
 }
 
 /// Maps of one class. Layer 0 is the nearest front, layer 1, if there is one, the farthest back.

@@ -9,11 +9,11 @@ use super::{
     splat::{classes, particles},
 };
 use crate::{
-    frame::Scene,
     method::Offers,
     parameters::parameters,
     passes::Drawn,
     plan::{Blend, Call, Groups, Plan, Rendering},
+    scene::Scene,
     shader::{EXTREMES_COMP, EXTREMES_FRAG, IMAGE_GROUP, SIDE_FRONT},
 };
 use ash::vk::Format;

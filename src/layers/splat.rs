@@ -3,9 +3,9 @@
 
 use super::Surface;
 use crate::{
-    frame::Scene,
     passes::Drawn,
     plan::{Call, Plan, Rendering, Target, Vertices},
+    scene::Scene,
     shader::{self, CLASS_BODY, CLASS_SPLASH, SIDE_BACK, SIDE_FRONT, Shader, Splat},
 };
 use ash::vk::{CompareOp, Format, PrimitiveTopology};

@@ -5,11 +5,11 @@ use super::{
     splat::{self, Names},
 };
 use crate::{
-    frame::Scene,
     method::Offers,
     parameters::parameters,
     passes::Drawn,
     plan::Plan,
+    scene::Scene,
     shader::{CLASS_BODY, CLASS_SPLASH},
 };
 

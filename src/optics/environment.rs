@@ -1,9 +1,9 @@
 //! The environment as optics see it (`glsl/include/environment.glsl`): the renderer's own, or the host's.
 
 use crate::{
-    frame::Scene,
     input::EnvironmentShape,
     plan::{Call, External, Plan},
+    scene::Scene,
 };
 use ash::vk::Format;
 

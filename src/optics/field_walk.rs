@@ -3,9 +3,9 @@
 
 use super::{tiles::Tiles, walk::variant};
 use crate::{
-    frame::Scene,
     layers::field::Volume,
     plan::{Call, Groups, Plan, Vertices},
+    scene::Scene,
     shader::{FIELD_TILE, FIELD_TILES_COMP, FIELD_WALK_FRAG, Shader},
 };
 

@@ -4,7 +4,7 @@ use super::{
     Fresnel, Shading,
     walk::{Walk, walk_parameters},
 };
-use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::parameters, plan::Plan};
+use crate::{layers::Surfaces, method::Offers, parameters::parameters, plan::Plan, scene::Scene};
 
 walk_parameters! {
     /// Up to four refractions, through two volumes of liquid (Imai16 §4.4), with total internal reflection.

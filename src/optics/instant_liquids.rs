@@ -4,7 +4,7 @@ use super::{
     Fresnel, Shading,
     lookup::{Lookup, Mode},
 };
-use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::parameters, plan::Plan};
+use crate::{layers::Surfaces, method::Offers, parameters::parameters, plan::Plan, scene::Scene};
 use glam::Vec3;
 
 parameters! {

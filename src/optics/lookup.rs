@@ -6,10 +6,10 @@ pub mod twin;
 
 use super::{Fresnel, Optics, environment};
 use crate::{
-    frame::Scene,
     input::Background,
     layers::Surfaces,
     plan::{Call, External, Plan, Rendering, Vertices},
+    scene::Scene,
     shader::{LOOKUP_BENT, LOOKUP_FRAG, LOOKUP_INDEX, LOOKUP_NORMAL, VIEW_VERT},
 };
 use glam::Vec3;

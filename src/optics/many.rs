@@ -4,7 +4,7 @@ use super::{
     Fresnel, Shading,
     walk::{Walk, walk_parameters},
 };
-use crate::{frame::Scene, layers::Surfaces, method::Offers, parameters::parameters, plan::Plan};
+use crate::{layers::Surfaces, method::Offers, parameters::parameters, plan::Plan, scene::Scene};
 
 walk_parameters! {
     /// Refractions through many volumes of liquid, in a density field alone: maps of depths know two.

@@ -15,11 +15,11 @@ pub(crate) mod walk;
 mod walls;
 
 use crate::{
-    frame::Scene,
     layers::Surfaces,
     method::Offers,
     parameters::{choices, family},
     plan::Plan,
+    scene::Scene,
 };
 
 family! {

@@ -1,7 +1,7 @@
 //! Light bends once, where it enters.
 
 use super::{Fresnel, Shading, four::Four, walk::Walk};
-use crate::{frame::Scene, layers::Surfaces, parameters::parameters, plan::Plan};
+use crate::{layers::Surfaces, parameters::parameters, plan::Plan, scene::Scene};
 
 parameters! {
     /// One refraction, at the front; far sides are not even drawn.

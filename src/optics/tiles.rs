@@ -3,9 +3,9 @@
 
 use super::{environment, walk::variant};
 use crate::{
-    frame::Scene,
     input::Background,
     plan::{Call, External, Plan, Target, Vertices},
+    scene::Scene,
     shader::{Shader, TILES_FRAG, TILES_VERT, VIEW_VERT},
 };
 use ash::vk;

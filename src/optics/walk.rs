@@ -6,10 +6,10 @@ use super::{
     walls,
 };
 use crate::{
-    frame::Scene,
     input::Background,
     layers::{Surface, Surfaces},
     plan::{Call, External, Plan, Rendering, Vertices},
+    scene::Scene,
     shader::WALK_FRAG,
 };
 use ash::vk::Format;
@@ -139,17 +139,4 @@ pub(super) fn variant(scene: &Scene) -> usize {
 pub(crate) fn placeholder(plan: &mut Plan) -> Surface {
     let depth = plan.nothing("no depth", Format::R32_SFLOAT, true);
     Surface { depth, normal: plan.nothing("no normal", Format::R32_UINT, true), sides: 1 }
-}
-
-/// Whether a format takes light as it is (float, or sRGB, which the hardware encodes) or encoded by the shader (UNORM);
-/// `None` for formats that cannot hold a picture.
-pub(crate) fn takes_linear(format: Format) -> Option<bool> {
-    use Format as F;
-    match format {
-        F::R32G32B32A32_SFLOAT | F::R16G16B16A16_SFLOAT | F::B10G11R11_UFLOAT_PACK32 => Some(true),
-        F::R8G8B8A8_SRGB | F::B8G8R8A8_SRGB | F::A8B8G8R8_SRGB_PACK32 => Some(true),
-        F::R8G8B8A8_UNORM | F::B8G8R8A8_UNORM | F::A8B8G8R8_UNORM_PACK32 => Some(false),
-        F::A2B10G10R10_UNORM_PACK32 | F::A2R10G10B10_UNORM_PACK32 | F::R16G16B16A16_UNORM => Some(false),
-        _ => None,
-    }
 }

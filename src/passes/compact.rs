@@ -2,8 +2,8 @@
 
 use super::{Arrays, Culled, Drawn, per_block, sums_bytes};
 use crate::{
-    frame::Scene,
     plan::{Call, Groups, Plan},
+    scene::Scene,
     shader::{COMPACT_COUNT_COMP, COMPACT_SCAN_COMP, COMPACT_SCATTER_COMP, Draws},
 };
 

@@ -2,9 +2,9 @@
 
 use super::{Arrays, Culled, per_particle};
 use crate::{
-    frame::Scene,
-    optics::tiles::Tiles,
+    optics::{tiles::Tiles, walk::Walk},
     plan::{Call, Plan, Target},
+    scene::Scene,
     shader::{CULL_COMP, VIEW_TILE},
 };
 
@@ -13,7 +13,8 @@ pub(crate) fn record(plan: &mut Plan, scene: &Scene, particles: &Arrays, bounds:
     let visible = plan.array("visible particles", 4 * u64::from(scene.count));
     let large = plan.buffer("large particles", 8);
     plan.fill("cull", large, 0, 8, 0);
-    let tiles = scene.tiled().then(|| Tiles::empty(plan, "cull", "tiles", 1, VIEW_TILE));
+    let tiles =
+        Walk::of(&scene.settings.method.optics).is_some().then(|| Tiles::empty(plan, "cull", "tiles", 1, VIEW_TILE));
     let call = particles
         .read_by(Call::compute(&CULL_COMP[usize::from(tiles.is_some())]))
         // Where nothing is bounded, the shader does not look; something has to be bound all the same, and validation

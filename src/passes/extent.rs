@@ -2,9 +2,9 @@
 
 use super::per_block;
 use crate::{
-    frame::Scene,
     plan::{Call, External, Groups, Home, Plan, Target},
     scale::Scale,
+    scene::Scene,
     shader::{EXTENT_MOST, EXTENT_PLAN_COMP, EXTENT_REDUCE_COMP, EXTENT_WORDS, Prepare},
 };
 use ash::vk;

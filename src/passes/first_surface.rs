@@ -1,10 +1,10 @@
 //! The first surface that each pixel shows (`glsl/first_surface.frag`), for what is said of it to the host ([`super::surface`]).
 
 use crate::{
-    frame::Scene,
     layers::Surfaces,
     optics::{field_walk, lookup::Lookup, walk::Walk},
     plan::{Call, External, Plan, Rendering, Target, Vertices},
+    scene::Scene,
     shader::{FIRST_SURFACE_FRAG, VIEW_VERT},
 };
 use ash::vk::Format;

@@ -1,7 +1,7 @@
 //! How the first surface moves: as the particle nearest to it does (`glsl/motion.frag`).
 
 use crate::{
-    frame::Moves,
+    input::Moves,
     plan::{Call, External, Plan, Rendering, Target, Vertices},
     shader::{MOTION_FRAG, MOTION_VERT},
 };

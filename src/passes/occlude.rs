@@ -2,10 +2,19 @@
 
 use super::{Arrays, per_particle};
 use crate::{
-    frame::Scene,
+    layers::Mapping,
     plan::{Call, Plan, Target},
+    scene::Scene,
     shader::OCCLUDE_COMP,
 };
+
+/// Whether hidden particles are dropped before drawing. That only saves time: where the bounds do not fit a storage buffer,
+/// everything is drawn.
+pub(crate) fn wanted(scene: &Scene, maps: &dyn Mapping) -> bool {
+    let pixels: u64 = scene.scale().size(scene.size).map(u64::from).iter().product();
+    let wanted = scene.settings.drawing.occlusion_culling && maps.may_cull(scene);
+    scene.body && wanted && 8 * pixels <= scene.storage_size
+}
 
 /// Two bounds a pixel, of front and back (`glsl/include/bounds.glsl`).
 pub(crate) fn record(plan: &mut Plan, scene: &Scene, particles: &Arrays) -> Target {

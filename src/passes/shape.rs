@@ -2,8 +2,8 @@
 
 use super::{Arrays, Points, rectangle, sort::Sorted};
 use crate::{
-    frame::{Preparation, Scene},
     plan::{Call, External, Plan, Target},
+    scene::{Preparation, Scene},
     shader::{PARTICLE_GROUP, SHAPE_COMP, SHAPE_RUN},
 };
 

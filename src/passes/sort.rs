@@ -2,8 +2,8 @@
 
 use super::{per_particle, sums_bytes};
 use crate::{
-    frame::{Preparation, Scene},
     plan::{Call, External, Groups, Plan, Target},
+    scene::{Preparation, Scene},
     shader::{
         DIGITS, EXTENT_DISPATCH, Prepare, SORT_COUNT_COMP, SORT_GATHER_COMP, SORT_PASSES, SORT_SCAN_COMP,
         SORT_SCATTER_COMP, Shader,

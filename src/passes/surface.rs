@@ -2,9 +2,9 @@
 //! image of the host's.
 
 use crate::{
-    frame::Scene,
     input::{Says, has_depth, is_halved},
     plan::{Call, External, Plan, Rendering, Target, Vertices},
+    scene::Scene,
     shader::{
         SURFACE_DEPTH_AS_COLOR_FRAG, SURFACE_DEPTH_FRAG, SURFACE_MOTION_FRAG, SURFACE_NORMAL_FRAG,
         SURFACE_REACTIVE_FRAG, VIEW_VERT,

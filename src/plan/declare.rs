@@ -111,3 +111,18 @@ impl Plan {
         Target(self.resources.len() - 1)
     }
 }
+
+#[cfg(feature = "inspect")]
+/// Targets that hold the liquid's surfaces as light meets them: the body's after smoothing. `None` where the frame has none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SurfaceNames {
+    /// Depths of the splashes.
+    pub splash_depth: Option<&'static str>,
+    /// Normals of the splashes.
+    pub splash_normal: Option<&'static str>,
+    /// Depths of the body.
+    pub body_depth: Option<&'static str>,
+    /// Normals of the body.
+    pub body_normal: Option<&'static str>,
+}

@@ -11,6 +11,8 @@ mod tests;
 pub(crate) use call::{Blend, Call, Recipe};
 #[cfg(feature = "inspect")]
 pub(crate) use declare::COUNTERS;
+#[cfg(feature = "inspect")]
+pub use declare::SurfaceNames;
 pub(crate) use step::{Groups, Rendering, Step, Vertices, Work};
 
 use crate::{
@@ -92,7 +94,7 @@ pub(crate) struct Plan {
     pub smoothing_steps: Option<u32>,
     /// Where the surfaces are that light meets.
     #[cfg(feature = "inspect")]
-    pub surfaces: crate::inspect::SurfaceNames,
+    pub surfaces: SurfaceNames,
     home: Home,
     part: &'static str,
     scale: Scale,

@@ -3,6 +3,7 @@
 use super::{Call, External, Groups, Home, Plan, Rendering, Target, Vertices};
 use crate::{
     resources::ImageSpec,
+    scene::Scene,
     shader::{CURVATURE_FLOW_COMP, NORMALS_COMP, PLANE_FIT_COMP, SPLAT_VERT, THICKNESS_FRAG, WALLS_COMP},
 };
 use ash::vk::{CompareOp, Format};
@@ -225,8 +226,7 @@ fn every_method_has_a_plan() {
                 }
                 for classes in [[0, 0], [3, 0], [0, 3], [2, 5]] {
                     for has_scene in [false, true] {
-                        let scene =
-                            frame::Scene { has_scene, ..frame::Scene::new(&settings, [16, 9], classes, &limits) };
+                        let scene = Scene { has_scene, ..Scene::new(&settings, [16, 9], classes, &limits) };
                         let plan = frame::plan(&scene).unwrap_or_else(|e| panic!("{settings:?}: {e}"));
                         assert!(!plan.steps.is_empty() && plan.descriptors().0 as usize >= plan.recipes().len());
                         planned += 1;

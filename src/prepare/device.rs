@@ -6,7 +6,7 @@ use super::{
     ellipsoids::{flat_offset, lattice_variance},
     options::Scale,
 };
-use crate::{Error, frame::Kept, renderer::bound, shader::Prepare, space};
+use crate::{Error, device::bound, shader::Prepare, space};
 use ash::vk;
 
 /// Positions in device memory, to be prepared within the frame that draws them: neighbours, classes and ellipsoids as
@@ -279,4 +279,13 @@ impl From<PrepareError> for Error {
             other => Error::parameter("particles", "", other.to_string()),
         }
     }
+}
+
+/// Classes that are kept from frame to frame.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Kept {
+    /// By ids of the host's, or else by index in its buffer.
+    pub by_id: bool,
+    /// How many there are.
+    pub number: u32,
 }

@@ -27,8 +27,8 @@ use glam::{DMat3, Mat3, Vec3};
 
 pub(crate) use density::rest_density;
 pub use density::{DensityField, classes_over, classify, densities};
-pub(crate) use device::Words;
 pub use device::{DeviceCount, DeviceIds, DevicePositions};
+pub(crate) use device::{Kept, Words};
 pub use neighbours::Search;
 pub use options::{Fit, Options};
 pub use points::points;

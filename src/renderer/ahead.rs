@@ -1,16 +1,17 @@
 //! What can be asked for and made before a frame is recorded: its memory and its pipelines.
 
 use super::{
-    BINDING_ALIGNMENT, HOMES, Renderer,
+    HOMES, Renderer,
     uploads::{PARTICLE_ARRAYS, POINTS, SPEEDS},
 };
 use crate::{
     Error, Settings,
-    device::{Host, Limits},
-    frame::{self, Preparation, Scene},
+    device::{BINDING_ALIGNMENT, Host, Limits},
+    frame,
     input::{Background, EnvironmentShape, FrameInput},
     plan::Plan,
     prepare::{self, DeviceIds, DevicePositions, Search},
+    scene::{Preparation, Scene},
     table::{self, LedgerEntry, Table},
 };
 use ash::vk;

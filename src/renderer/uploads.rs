@@ -5,11 +5,11 @@ use crate::{
     Error, access,
     allocator::Location,
     environment::{Equirect, footprints},
-    frame::Scene,
     layers::{Kind, field::MOST_POINTS},
     particles::{Class, Particles, Point},
     prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},
+    scene::Scene,
     shader,
     space::{self, Space},
 };
