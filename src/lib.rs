@@ -100,6 +100,8 @@ pub mod statistics;
 #[cfg(feature = "study")]
 pub mod study;
 mod table;
+#[cfg(feature = "tracy")]
+pub mod tracy;
 #[cfg(feature = "inspect")]
 pub mod twin;
 pub mod work;

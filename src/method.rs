@@ -164,6 +164,8 @@ pub const PRESETS: &[Preset] = &[
         members: ["nearest-farthest", "bilateral", "two"],
         values: &[("internal_reflections", "0")],
     },
+    // Their grid and its one refraction; rays find its level where they splat surfels of it, and shares are volume-normalised as ours.
+    Preset { name: "iwasaki06", members: ["dense-grid", "none", "one"], values: &[] },
     Preset { name: "cords08", members: ["front", "binomial", "instant-liquids"], values: &[] },
     Preset { name: "green10", members: ["front", "bilateral-separable", "ssfr"], values: &[] },
     Preset { name: "im16", members: ["front", "bilateral-separable", "ssfr-index"], values: &[] },

@@ -36,16 +36,18 @@ run() { # tests of one binary, in the copy
   [ "$1" != capilib ] || binary=(-p meniscus-capi --lib)
   [ "$1" != wgpu ] || binary=(-p meniscus-wgpu --test host)
   [ "$1" != wgpulib ] || binary=(-p meniscus-wgpu --lib)
+  [ "$1" != tracy ] || binary=(--no-default-features --features io,host,tracy --test tracy)
+  [ "$1" != tracylib ] || binary=(--no-default-features --features io,host,tracy --lib)
   (cd "$copy" && timeout 900 cargo test --quiet "${binary[@]}" -- --exact "${@:2}" > mutant.log 2>&1)
 }
 place() { # binary and name of a test
   case $1 in
-    endurance::* | memory::* | cpu::* | cli::* | view::* | lib::* | capi::* | capilib::* | wgpu::* | wgpulib::*) binary=${1%%::*} name=${1#*::} ;;
+    endurance::* | memory::* | cpu::* | cli::* | view::* | lib::* | capi::* | capilib::* | wgpu::* | wgpulib::* | tracy::* | tracylib::*) binary=${1%%::*} name=${1#*::} ;;
     *) binary=gpu name=$1 ;;
   esac
 }
 # Without a mistake they pass, or their failing would say nothing.
-for each in gpu endurance memory cpu cli view lib capi capilib wgpu wgpulib; do
+for each in gpu endurance memory cpu cli view lib capi capilib wgpu wgpulib tracy tracylib; do
   sound=()
   for line in "${lines[@]}"; do
     place "${line##* ::: }"

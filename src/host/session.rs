@@ -14,6 +14,8 @@ pub struct Session<'a> {
     /// The renderer, for particles, needs and memory.
     pub renderer: Renderer,
     canvas: Canvas<'a>,
+    #[cfg(feature = "tracy")]
+    zones: crate::tracy::Zones,
 }
 
 impl<'a> Session<'a> {
@@ -27,7 +29,13 @@ impl<'a> Session<'a> {
             Canvas::new(gpu, FORMAT, 16, size)
         });
         match ready {
-            Ok(canvas) => Ok(Session { gpu, renderer, canvas }),
+            Ok(canvas) => Ok(Session {
+                gpu,
+                renderer,
+                canvas,
+                #[cfg(feature = "tracy")]
+                zones: crate::tracy::Zones::new("meniscus"),
+            }),
             Err(e) => {
                 // SAFETY: `run` waits, so nothing is in flight.
                 unsafe { renderer.destroy() };
@@ -57,7 +65,13 @@ impl<'a> Session<'a> {
             // brought into the stated layout.
             Ok(unsafe { renderer.record(cmd, &input) }?)
         })?;
-        Ok(self.renderer.times(input.slot))
+        let times = self.renderer.times(input.slot);
+        #[cfg(feature = "tracy")]
+        if let Some(times) = &times {
+            // What finds no track is not seen in Tracy, and drawn all the same.
+            let _ = self.zones.send(times);
+        }
+        Ok(times)
     }
 
     /// The picture as last rendered: linear RGB, row by row.

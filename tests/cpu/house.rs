@@ -96,15 +96,15 @@ fn planted_mistakes_can_be_planted() {
         assert_eq!(code.matches(text).count(), 1, "{file}: {text}");
         let (module, name) = test.rsplit_once("::").expect("module::test");
         let folder = match module.split("::").next() {
-            Some("cpu" | "cli" | "view" | "endurance" | "memory") => "tests",
+            Some("cpu" | "cli" | "view" | "endurance" | "memory" | "tracy") => "tests",
             Some("capi") => "capi/tests",
             Some("wgpu") => "hosts/wgpu/tests/host",
             Some("wgpulib") => "hosts/wgpu/src",
-            Some("lib") => "src",
+            Some("lib" | "tracylib") => "src",
             Some("capilib") => "capi/src",
             _ => "tests/gpu",
         };
-        let outside = ["lib::", "capilib::", "wgpu::", "wgpulib::"];
+        let outside = ["lib::", "capilib::", "wgpu::", "wgpulib::", "tracylib::"];
         let module = outside.iter().find_map(|o| module.strip_prefix(o)).unwrap_or(module).replace("::", "/");
         // Unit tests may be a module within the file of what they test.
         let within = module.strip_suffix("/tests").unwrap_or(&module);

@@ -31,6 +31,8 @@ pub struct Pane<'a> {
     filter: vk::Filter,
     /// Of the frame last looked at.
     pub times: Option<FrameTimes>,
+    #[cfg(feature = "tracy")]
+    zones: meniscus::tracy::Zones,
 }
 
 impl<'a> Pane<'a> {
@@ -53,6 +55,8 @@ impl<'a> Pane<'a> {
             retired: Vec::new(),
             filter: if smooth { vk::Filter::LINEAR } else { vk::Filter::NEAREST },
             times: None,
+            #[cfg(feature = "tracy")]
+            zones: meniscus::tracy::Zones::new("meniscus view"),
         };
         let renderer = pane.renderer();
         // SAFETY: `run` records outside rendering, and submits before any frame.
@@ -134,6 +138,10 @@ impl<'a> Pane<'a> {
     /// Times of the frame last recorded into a slot, which has completed.
     pub fn look_at_times(&mut self, slot: usize) {
         let times = self.renderer().times(slot);
+        #[cfg(feature = "tracy")]
+        if let Some(times) = &times {
+            let _ = self.zones.send(times);
+        }
         self.times = times.or(self.times.take());
     }
 
