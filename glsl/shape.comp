@@ -1,8 +1,9 @@
 // From neighbours to what is drawn: number density and class (Imai16 section 4.1), and for the body an ellipsoid, in place or
 // as YuTurk13 has it (docs/methods.md, "Preparation").
 //
-// One invocation takes SHAPE_RUN particles that follow each other in the sorted order. Those of them that lie in the same cell,
-// or in the next along z, are taken together, each in a component of a vector: what is looked up and read once serves all.
+// One invocation takes AT_ONCE particles that follow each other in the sorted order. Those of them that lie in the same cell,
+// or in the next along z, are taken together, each in a component of a vector: what is looked up and read once serves all, which
+// CPUs gain by. ALONE: it takes one, with a fourth of the registers.
 //
 // Candidates for neighbours come in runs of the sorted order. Sorted cells are as wide as the support, so 3 x 3 runs of 3
 // cells (with YuTurk13's reach 5 x 5 of 5) hold all candidates. With RELATION_TABLE cells are as wide as the reach, and one run of the table holds them all.
@@ -10,7 +11,7 @@
 //
 // POINTS: a density field asks for number densities, and for no ellipsoids.
 #version 460
-// Compiled with any of: NEIGHBOURS, KEEP_CLASSES, POINTS
+// Compiled with any of: NEIGHBOURS, KEEP_CLASSES, POINTS, ALONE
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"
@@ -37,6 +38,25 @@ layout(constant_id = 3) const bool BY_ID = false;
 layout(set = 0, binding = 10, std430) writeonly buffer NeighbourBlock { uint at[]; } neighbours;
 #endif
 layout(constant_id = 1) const uint COUNTERS = 0; // slot of its first counter
+
+// A number, a whole number or a condition of each particle that is taken at once, and that of one of them.
+#ifdef ALONE
+#define AT_ONCE 1
+#define EACH float
+#define EACH_UINT uint
+#define EACH_BOOL bool
+#define OF(each, c) each
+#define LESS(a, b) ((a) < (b))
+#define ANY(each) each
+#else
+#define AT_ONCE SHAPE_RUN
+#define EACH vec4
+#define EACH_UINT uvec4
+#define EACH_BOOL bvec4
+#define OF(each, c) each[c]
+#define LESS(a, b) lessThan(a, b)
+#define ANY(each) any(each)
+#endif
 
 vec3 sorted_position(uint k) { return vec3(sorted.at[3u * k], sorted.at[3u * k + 1u], sorted.at[3u * k + 2u]); }
 uint entry_at(uint rank) { // the sort's result
@@ -125,8 +145,8 @@ bool nearer(vec3 a, vec3 b) {
 }
 
 // The cubic spline without a branch: 2 (1 - q)^3 less 8 (1/2 - q)^3 where those are positive.
-vec4 spline(vec4 q) {
-    vec4 far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
+EACH spline(EACH q) {
+    EACH far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
     return 2.0 * far * far * far - 8.0 * near * near * near;
 }
 
@@ -158,39 +178,39 @@ void eigen(inout mat3 a, out mat3 v) {
 #endif
 
 // A vector for each of the particles that are taken together.
-struct Vectors { vec4 x, y, z; };
-vec3 of(Vectors v, uint b) { return vec3(v.x[b], v.y[b], v.z[b]); }
+struct Vectors { EACH x, y, z; };
+vec3 of(Vectors v, uint b) { return vec3(OF(v.x, b), OF(v.y, b), OF(v.z, b)); }
 
 #ifdef POINTS
 // What is summed over the neighbours of each: whole numbers, so that the order of the input does not show.
-struct Sums { uvec4 density; };
+struct Sums { EACH_UINT density; };
 const float DENSITY_ONE = 262144.0;
 const uint MOST_AT_ONCE = 4096u, MOST_DENSITY = 0x7fffffffu;
 
-void add(inout Sums s, bvec4 near, uint many, Vectors o, vec4 squared) {
-    vec4 d = sqrt(mix(vec4(prepare.support * prepare.support), squared, near));
-    uvec4 weight = uvec4(spline(d * (1.0 / prepare.support)) * DENSITY_ONE + 0.5);
+void add(inout Sums s, EACH_BOOL near, uint many, Vectors o, EACH squared) {
+    EACH d = sqrt(mix(EACH(prepare.support * prepare.support), squared, near));
+    EACH_UINT weight = EACH_UINT(spline(d * (1.0 / prepare.support)) * DENSITY_ONE + 0.5);
     s.density = min(s.density + min(many, MOST_AT_ONCE) * weight, MOST_DENSITY);
 }
 #else
 // What is summed over the neighbours of each, offsets measured from it.
 struct Sums {
-    uvec4 number;
-    vec4 density;
-    vec4 weight;
+    EACH_UINT number;
+    EACH density;
+    EACH weight;
     Vectors first;
     Vectors diagonal;
     Vectors mixed_part;
 };
 
 // Adds what is near, `many` times; a choice of numbers costs less than a branch that neighbouring invocations take differently.
-void add(inout Sums s, bvec4 near, uint many, Vectors o, vec4 squared) {
-    vec4 d = sqrt(mix(vec4(prepare.reach * prepare.reach), squared, near));
-    vec4 q = d * (1.0 / prepare.reach), w = float(many) * mix(vec4(0.0), 1.0 - q * q * q, near);
-    s.number += many * uvec4(near);
+void add(inout Sums s, EACH_BOOL near, uint many, Vectors o, EACH squared) {
+    EACH d = sqrt(mix(EACH(prepare.reach * prepare.reach), squared, near));
+    EACH q = d * (1.0 / prepare.reach), w = float(many) * mix(EACH(0.0), 1.0 - q * q * q, near);
+    s.number += many * EACH_UINT(near);
     s.density += float(many) * spline(d * (1.0 / prepare.support));
     s.weight += w;
-    vec4 x = w * o.x, y = w * o.y, z = w * o.z;
+    EACH x = w * o.x, y = w * o.y, z = w * o.z;
     s.first.x += x;
     s.first.y += y;
     s.first.z += z;
@@ -257,8 +277,8 @@ void write_ellipsoid(uint k, vec3 center, mat3 v, vec3 lengths) {
 // Variances of a particle's neighbours around their mean, in r squared, along the columns of v; from sums, those of component b.
 vec3 variances_of(Sums s, uint b, vec3 mean, out mat3 v) {
     float unit = 1.0 / prepare.radius;
-    vec3 d = of(s.diagonal, b) / s.weight[b] - mean * mean;
-    vec3 m = of(s.mixed_part, b) / s.weight[b] - mean.xxy * mean.yzz;
+    vec3 d = of(s.diagonal, b) / OF(s.weight, b) - mean * mean;
+    vec3 m = of(s.mixed_part, b) / OF(s.weight, b) - mean.xxy * mean.yzz;
     mat3 a = unit * unit * mat3(d.x, m.x, m.y, m.x, d.y, m.z, m.y, m.z, d.z);
     eigen(a, v);
     return vec3(a[0][0], a[1][1], a[2][2]);
@@ -267,7 +287,7 @@ vec3 variances_of(Sums s, uint b, vec3 mean, out mat3 v) {
 // The ellipsoid in place of particle k; center in radii. `above`: its density above where no class is kept any more, as a part
 // of a filled body's: below that it is the splash's ball, so that a class that changes changes no shape.
 void write_in_place(uint k, vec3 center, float above, Sums s, uint b) {
-    vec3 mean = of(s.first, b) / s.weight[b];
+    vec3 mean = of(s.first, b) / OF(s.weight, b);
     mat3 v;
     vec3 variance = max(variances_of(s, b, mean, v), 0.0) / prepare.filled_variance + DEGENERATE_VARIANCE;
     vec3 wanted = ELLIPSOID_SIZE * sqrt(variance * pow(variance.x * variance.y * variance.z, -1.0 / 3.0));
@@ -282,7 +302,7 @@ void write_in_place(uint k, vec3 center, float above, Sums s, uint b) {
 
 // YuTurk13's.
 void write_yu_turk(uint k, vec3 center, Sums s, uint b) {
-    vec3 mean = of(s.first, b) / s.weight[b];
+    vec3 mean = of(s.first, b) / OF(s.weight, b);
     mat3 v;
     vec3 variance = variances_of(s, b, mean, v);
     float most = max(variance.x, max(variance.y, variance.z)), least = most * prepare.least_ratio;
@@ -301,7 +321,7 @@ void write_yu_turk(uint k, vec3 center, Sums s, uint b) {
 #ifdef POINTS
 // Class and density of particle k at x from its sum, that of component b.
 void finish(uint k, vec3 x, Sums s, uint b) {
-    float relative = float(s.density[b]) / (DENSITY_ONE * prepare.filled_density);
+    float relative = float(OF(s.density, b)) / (DENSITY_ONE * prepare.filled_density);
     bool body = classify(k, relative);
     note(body ? BODY : SPLASH);
     points.at[k] = vec4(x, body ? relative : -relative);
@@ -312,14 +332,14 @@ void finish(uint k, vec3 x, Sums s, uint b) {
     vec3 origin = uintBitsToFloat(uvec3(extent.at[EXTENT_ORIGIN], extent.at[EXTENT_ORIGIN + 1], extent.at[EXTENT_ORIGIN + 2]));
     float unit = 1.0 / prepare.radius;
     vec3 center = unit * (x - origin);
-    float relative = s.density[b] / prepare.filled_density;
+    float relative = OF(s.density, b) / prepare.filled_density;
     if (!classify(k, relative)) {
         write_sphere(k, center, SPLASH);
         return;
     }
     note(BODY);
     if (!YU_TURK) write_in_place(k, center, relative - prepare.keep_below, s, b);
-    else if (s.number[b] <= prepare.min_neighbours + 1u) write_sphere(k, center, FEW_NEIGHBOURS);
+    else if (OF(s.number, b) <= prepare.min_neighbours + 1u) write_sphere(k, center, FEW_NEIGHBOURS);
     else write_yu_turk(k, center, s, b);
 }
 
@@ -337,18 +357,18 @@ struct Batch {
 // The particle at `from` and those that follow in the same cell or the next: their candidates are nearly the same. `to`: where
 // the invocation's own end.
 Batch batch_of(uint from, uint to, vec3 x) {
-    Batch b = Batch(from, from + 1u, Vectors(x.xxxx, x.yyyy, x.zzzz), cell_of(x), 0);
+    Batch b = Batch(from, from + 1u, Vectors(EACH(x.x), EACH(x.y), EACH(x.z)), cell_of(x), 0);
     b.top = b.cell.z;
-    for (uint c = 1u; c < SHAPE_RUN; ++c) {
+    for (uint c = 1u; c < AT_ONCE; ++c) {
         if (RELATION_TABLE || b.next == to) break;
         x = sorted_position(b.next);
         ivec3 own = cell_of(x);
         if (!finite(x) || own.xy != b.cell.xy || own.z > b.cell.z + 1) break;
         ++b.next;
         b.top = own.z;
-        b.x.x[c] = x.x;
-        b.x.y[c] = x.y;
-        b.x.z[c] = x.z;
+        OF(b.x.x, c) = x.x;
+        OF(b.x.y, c) = x.y;
+        OF(b.x.z, c) = x.z;
     }
     return b;
 }
@@ -374,24 +394,24 @@ uint find_runs(Batch b) {
 }
 
 // Offsets of candidate y from a batch's particles, their squares, and which are shorter than the reach.
-bvec4 neighbours_of(Batch b, vec3 y, out Vectors offset, out vec4 squared) {
+EACH_BOOL neighbours_of(Batch b, vec3 y, out Vectors offset, out EACH squared) {
     float limit = prepare.reach * prepare.reach;
     offset = Vectors(y.x - b.x.x, y.y - b.x.y, y.z - b.x.z);
     squared = offset.x * offset.x + offset.y * offset.y + offset.z * offset.z;
-    bvec4 near = lessThan(squared, vec4(limit)), tie = lessThanEqual(abs(squared - limit), vec4(4e-6 * limit));
-    if (any(tie)) {
-        for (uint c = 0u; c < SHAPE_RUN; ++c) {
-            if (tie[c]) near[c] = nearer(of(b.x, c), y);
+    EACH_BOOL near = LESS(squared, EACH(limit)), tie = LESS(abs(squared - limit), EACH(4.1e-6 * limit));
+    if (ANY(tie)) {
+        for (uint c = 0u; c < AT_ONCE; ++c) {
+            if (OF(tie, c)) OF(near, c) = nearer(of(b.x, c), y);
         }
     }
     return near;
 }
 
 #ifdef NEIGHBOURS
-uint listed[SHAPE_RUN]; // how many neighbours each particle of the batch has
-void list(Batch b, bvec4 near, uint candidate) {
+uint listed[AT_ONCE]; // how many neighbours each particle of the batch has
+void list(Batch b, EACH_BOOL near, uint candidate) {
     for (uint c = 0u; b.from + c < b.next; ++c) {
-        if (!near[c]) continue;
+        if (!OF(near, c)) continue;
         uint word = 2u + listed[c]++;
         if (word < list_words()) neighbours.at[(b.from + c) * list_words() + word] = input_index(candidate);
     }
@@ -401,10 +421,10 @@ void list(Batch b, bvec4 near, uint candidate) {
 // The sums over a batch's neighbours, from the candidates in `number` runs.
 Sums sum_over(Batch b, uint number) {
 #ifdef POINTS
-    Sums s = Sums(uvec4(0u));
+    Sums s = Sums(EACH_UINT(0u));
 #else
-    Vectors none = Vectors(vec4(0.0), vec4(0.0), vec4(0.0));
-    Sums s = Sums(uvec4(0u), vec4(0.0), vec4(0.0), none, none, none);
+    Vectors none = Vectors(EACH(0.0), EACH(0.0), EACH(0.0));
+    Sums s = Sums(EACH_UINT(0u), EACH(0.0), EACH(0.0), none, none, none);
 #endif
     // One loop over all runs: invocations whose runs differ in length stay together.
     uint run = 0u, j = runs[0].x, end = runs[0].y, step = step_of(runs[0]);
@@ -417,8 +437,8 @@ Sums sum_over(Batch b, uint number) {
         }
         uint candidate = RELATION_TABLE ? entry_at(j) / 27u : j;
         Vectors offset;
-        vec4 squared;
-        bvec4 near = neighbours_of(b, sorted_position(candidate), offset, squared);
+        EACH squared;
+        EACH_BOOL near = neighbours_of(b, sorted_position(candidate), offset, squared);
 #ifdef NEIGHBOURS
         // All are listed; those that the sums leave out count nothing.
         list(b, near, candidate);
@@ -434,16 +454,16 @@ Sums sum_over(Batch b, uint number) {
 
 void main() {
     for (uint c = 0u; c < FATES; ++c) tally[c] = 0u;
-    uint first = invocation() * SHAPE_RUN, next = min(first, particles()), to = min(first + SHAPE_RUN, particles());
+    uint first = invocation() * AT_ONCE, next = min(first, particles()), to = min(first + AT_ONCE, particles());
 #ifdef POINTS
     // Those that are not there; who reads points goes through as many as there may be.
-    for (uint k = max(first, to); k < min(first + SHAPE_RUN, prepare.count); ++k) points.at[k] = vec4(0.0);
+    for (uint k = max(first, to); k < min(first + AT_ONCE, prepare.count); ++k) points.at[k] = vec4(0.0);
 #endif
     while (next < to) {
         uint from = next++;
         vec3 x = sorted_position(from);
 #ifdef NEIGHBOURS
-        for (uint c = 0u; c < SHAPE_RUN; ++c) listed[c] = 0u;
+        for (uint c = 0u; c < AT_ONCE; ++c) listed[c] = 0u;
 #endif
         if (!finite(x)) {
 #ifdef POINTS
@@ -459,7 +479,7 @@ void main() {
         Batch b = batch_of(from, to, x);
         next = b.next;
         Sums s = sum_over(b, find_runs(b));
-        for (uint c = 0u; c < SHAPE_RUN; ++c) {
+        for (uint c = 0u; c < AT_ONCE; ++c) {
             if (from + c == next) break;
 #ifdef NEIGHBOURS
             begin_list(from + c, listed[c]);

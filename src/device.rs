@@ -85,6 +85,8 @@ pub(crate) struct Limits {
     pub texels_size: u64,
     /// Largest device-local heap in bytes.
     pub memory: u64,
+    /// Whether it is a CPU.
+    pub cpu: bool,
 }
 
 /// Checks that a physical device can render at all; lists the first thing it lacks. What must also be *enabled* on
@@ -159,6 +161,7 @@ impl Host {
             storage_size: u64::from(properties.limits.max_storage_buffer_range),
             texels_size: 16 * u64::from(properties.limits.max_texel_buffer_elements),
             memory: largest_heap(&memory),
+            cpu: properties.device_type == vk::PhysicalDeviceType::CPU,
         }
     }
 

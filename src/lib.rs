@@ -124,6 +124,6 @@ pub use parameters::{Parameter, Parameters};
 pub use particles::{Class, Ellipsoid, Particles, Point};
 pub use recorder::PlanEntry;
 pub use renderer::Renderer;
-pub use settings::{Camera, Drawing, Liquid, Settings};
+pub use settings::{AtOnce, Camera, Drawing, Liquid, Settings};
 pub use space::RADII;
 pub use table::LedgerEntry;

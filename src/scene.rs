@@ -53,6 +53,8 @@ pub(crate) struct Scene<'a> {
     pub smoothing_steps: Option<u32>,
     /// Whether the device has points larger than a pixel.
     pub points: bool,
+    /// Whether an invocation that sums over neighbours takes four particles at once.
+    pub four: bool,
     /// Largest edge of an image.
     pub image_size: u32,
     /// Largest storage buffer in bytes, and texel buffer.
@@ -101,6 +103,7 @@ impl<'a> Scene<'a> {
             surface_read: false,
             smoothing_steps: None,
             points: limits.point_size > 1.0,
+            four: settings.drawing.at_once.is_four(limits.cpu),
             image_size: limits.image_size,
             storage_size: limits.storage_size,
             texels_size: limits.texels_size,

@@ -2,7 +2,7 @@
 
 use crate::{
     Error, Method,
-    parameters::{Parameter, Parameters, Part, parameters},
+    parameters::{Parameter, Parameters, Part, choices, parameters},
     shader::Frame,
     space::Space,
 };
@@ -20,6 +20,25 @@ parameters! {
     }
 }
 
+choices! {
+    /// How many particles an invocation takes that sums over their neighbours on the device.
+    pub enum AtOnce {
+        /// What suits the device: four on CPUs, one on GPUs.
+        #[default]
+        ByDevice = "by-device",
+        /// Four, which share what is read of candidates.
+        Four = "four",
+        /// One, with a fourth of the registers.
+        One = "one",
+    }
+}
+
+impl AtOnce {
+    pub(crate) fn is_four(self, on_cpu: bool) -> bool {
+        self == AtOnce::Four || (self == AtOnce::ByDevice && on_cpu)
+    }
+}
+
 parameters! {
     /// How particles are drawn. Changes no pixel.
     pub struct Drawing {
@@ -27,6 +46,8 @@ parameters! {
         occlusion_culling: bool = true, "", "true or false" => |_| true;
         /// Draw quads even where point sprites would do
         quads_only: bool = false, "", "true or false" => |_| true;
+        /// Where the device prepares particles: how many of them an invocation takes
+        at_once: AtOnce = AtOnce::ByDevice, "", "by-device (four on CPUs, one on GPUs), four or one" => |_| true;
     }
 }
 

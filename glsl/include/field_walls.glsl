@@ -166,6 +166,10 @@ void meet_balls(uint entry, vec3 brick, vec3 x, vec3 dir, inout Wall wall) {
     }
 }
 
+// So many bricks of a block, or cells of a brick, a ray crosses at most, where places can tell one from the next. Liquid may be so wide
+// that they cannot: then steps run out, where a loop without an end would be the end of the device.
+const uint CROSSED = 3u * (uint(FIELD_BRICK) - 1u) + 1u;
+
 // A ray on its way through the lattice.
 struct Course {
     vec3 x;
@@ -204,7 +208,7 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
             bool stop = false, within = true;
             vec3 brick = vec3(0.0);
             uint k = 0u;
-            while (within && !stop) {
+            for (uint crossed = 0u; crossed < CROSSED && within && !stop; ++crossed) {
                 brick = edge * floor(c.cell * per_edge);
                 k = local_of((brick - block.low) / BRICK_EDGE);
                 stop = field_bit(stops, k);
@@ -220,7 +224,7 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
             ball = words[FIELD_FIRST_BALL];
             meet_balls(inside ? 0u : ball, brick, x, dir, wall);
             edge = surface ? 1.0 : BRICK_EDGE;
-            while (stop && !at_surface) {
+            for (uint crossed = 0u; crossed < CROSSED && stop && !at_surface; ++crossed) {
                 k = local_of(c.cell - brick);
                 at_surface = field_bit(bits, k);
                 if (!at_surface) {

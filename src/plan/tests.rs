@@ -2,6 +2,7 @@
 
 use super::{Call, External, Groups, Home, Plan, Rendering, Target, Vertices};
 use crate::{
+    device::Limits,
     resources::ImageSpec,
     scene::Scene,
     shader::{CURVATURE_FLOW_COMP, NORMALS_COMP, PLANE_FIT_COMP, SPLAT_VERT, THICKNESS_FRAG, WALLS_COMP},
@@ -202,19 +203,22 @@ fn no_two_resources_share_a_name() {
     assert!(said.contains("two resources have this name"), "{said}");
 }
 
+/// Of some GPU.
+const LIMITS: Limits = Limits {
+    point_size: 64.0,
+    image_size: 4096,
+    timestamp_period: None,
+    timestamp_mask: 0,
+    storage_size: 1 << 30,
+    texels_size: 1 << 20,
+    memory: 1 << 32,
+    cpu: false,
+};
+
 /// Every preset and every member with its defaults can be planned, with and without particles and a scene.
 #[test]
 fn every_method_has_a_plan() {
-    use crate::{Settings, device::Limits, frame, layers::Layers, optics::Optics, smooth::Smooth};
-    let limits = Limits {
-        point_size: 64.0,
-        image_size: 4096,
-        timestamp_period: None,
-        timestamp_mask: 0,
-        storage_size: 1 << 30,
-        texels_size: 1 << 20,
-        memory: 1 << 32,
-    };
+    use crate::{Settings, frame, layers::Layers, optics::Optics, smooth::Smooth};
     let (mut planned, mut refused) = (0, 0);
     for layers in Layers::all() {
         for smooth in Smooth::all() {
@@ -226,7 +230,7 @@ fn every_method_has_a_plan() {
                 }
                 for classes in [[0, 0], [3, 0], [0, 3], [2, 5]] {
                     for has_scene in [false, true] {
-                        let scene = Scene { has_scene, ..Scene::new(&settings, [16, 9], classes, &limits) };
+                        let scene = Scene { has_scene, ..Scene::new(&settings, [16, 9], classes, &LIMITS) };
                         let plan = frame::plan(&scene).unwrap_or_else(|e| panic!("{settings:?}: {e}"));
                         assert!(!plan.steps.is_empty() && plan.descriptors().0 as usize >= plan.recipes().len());
                         planned += 1;
@@ -236,4 +240,25 @@ fn every_method_has_a_plan() {
         }
     }
     assert!(planned > 300 && refused > 10, "{planned}, {refused}");
+}
+
+/// Four particles an invocation where that is a CPU's, one on GPUs; and what is asked for.
+#[test]
+fn devices_take_as_many_particles_at_once_as_suits_them() {
+    use crate::{AtOnce, Settings, frame, prepare::DevicePositions, renderer::Amount};
+    let positions = DevicePositions::packed(ash::vk::Buffer::null(), 1000, 1.0);
+    for (at_once, cpu, four) in [
+        (AtOnce::ByDevice, true, true),
+        (AtOnce::ByDevice, false, false),
+        (AtOnce::Four, false, true),
+        (AtOnce::One, true, false),
+    ] {
+        let (mut settings, limits) = (Settings::default(), Limits { cpu, ..LIMITS });
+        settings.drawing.at_once = at_once;
+        let mut scene = Scene::new(&settings, [16, 9], [0, 0], &limits);
+        Amount::OnDevice(&positions).fill(&mut scene).expect("positions");
+        let plan = frame::plan(&scene).expect("a frame");
+        let names: Vec<_> = plan.recipes().iter().map(|r| r.name()).filter(|n| n.starts_with("shape.comp")).collect();
+        assert!(names.len() == 1 && names[0].contains("ALONE") != four, "{at_once:?}, {cpu}: {names:?}");
+    }
 }

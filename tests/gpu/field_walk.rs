@@ -4,14 +4,14 @@ use crate::{
     analytic::{self, Pixel, pixels, snell},
     background::{HostScene, painted},
     field::{prepared, settings, words},
-    support::{Case, Choose, Driver, Random, SKY, Shot, camera, each_driver},
+    support::{Case, Choose, Cloud, Driver, Random, SKY, Shot, camera, each_driver},
     walk::degrees,
 };
 use glam::{DVec3, Vec3};
 use meniscus::{
     Background, Class, Point,
     layers::field::Field,
-    prepare::{Input, Options, points},
+    prepare::{Input, Options, Search, points},
     shader::{
         Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED, OUTCOME_REFLECTION_LIMIT,
         OUTCOME_SCENE, PATTERN_BODY, PATTERN_NONE, PATTERN_SPLASH, REFLECTION_LEAST, SPLASH_RADIUS,
@@ -276,6 +276,18 @@ fn an_eye_in_the_liquid_sees_from_within() {
 }
 
 /// Points and quads draw the same tiles, whatever the size of the picture.
+/// Liquid so wide that floats cannot tell one cell from the next: frames end, and what they show is light.
+#[test]
+fn walks_end_where_cells_cannot_be_told_apart() {
+    each_driver(|driver| {
+        let all = crate::shape::clouds();
+        let (_, radius, positions) = all.iter().find(|(name, ..)| *name == "two millions wide").expect("a cloud");
+        let case = Case { settings: Default::default(), ..crate::shape::empty(*radius) };
+        let shot = driver.shoot_cloud_unlisted(&case, &Cloud::new(positions, Search::Runs));
+        assert!(shot.picture.iter().flatten().all(|v| v.is_finite() && *v >= 0.0), "{}", driver.name);
+    });
+}
+
 #[test]
 fn points_and_quads_draw_the_same() {
     let mut odd = case(Field::default(), 4, 4);

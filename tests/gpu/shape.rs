@@ -4,7 +4,7 @@
 use crate::support::{Case, Choose, Cloud, Driver, Random, Shot, camera, each_driver, imai16};
 use glam::Vec3;
 use meniscus::{
-    Class, Particles,
+    AtOnce, Class, Particles, Settings,
     prepare::{Fit, Input, Options, Search, classify, prepare},
     twin::shape::neighbours,
 };
@@ -176,6 +176,31 @@ fn classes_and_ellipsoids_are_the_cpus() {
                 Options { support: Some(6.0 * radius), splash_threshold: 0.7, ..Options::default() },
             ] {
                 agrees(driver, name, radius, &positions, &other, tolerance);
+            }
+        }
+    });
+}
+
+/// Four particles an invocation as on CPUs, or one as on GPUs.
+#[test]
+fn one_at_a_time_changes_no_bit() {
+    let ellipsoids = &["particle centres", "particle shapes (diagonal)", "particle shapes (mixed)"][..];
+    each_driver(|driver| {
+        for (name, radius, positions) in clouds() {
+            for (settings, arrays, options) in [
+                (imai16().refractions(1), ellipsoids, Options::default()),
+                (imai16().refractions(1), ellipsoids, Options::default().ellipsoids(Fit::YuTurk)),
+                (Settings::default(), &["particle points"], Options::default()),
+            ] {
+                let [four, one] = [AtOnce::Four, AtOnce::One].map(|at_once| {
+                    let mut case = Case { settings, ..empty(radius) };
+                    case.settings.drawing.at_once = at_once;
+                    let cloud = Cloud { options, ..Cloud::new(&positions, Search::Runs) };
+                    let shot = driver.shoot_cloud(&case, &cloud);
+                    let read = |id: &&'static str| shot.words(id, 0).expect("prepared").to_vec();
+                    (arrays.iter().map(read).collect::<Vec<_>>(), listed(&shot, positions.len()))
+                });
+                assert!(four == one, "{}: {name}: {arrays:?}, {:?}", driver.name, options.ellipsoids);
             }
         }
     });
