@@ -34,7 +34,8 @@ void main() {
     scan_row(gl_WorkGroupID.x, blocks(), LISTS);
 #else
     uint block = group_index(), count = frame.count;
-    if (block >= blocks()) return;
+    // Where there are none the first block says so: what the last frame drew is not drawn again.
+    if (block >= max(blocks(), 1u)) return;
     uint from = min(block * BLOCK + gl_LocalInvocationIndex * ITEMS, count), to = min(from + ITEMS, count);
     uint mine[LISTS] = uint[](0u, 0u, 0u, 0u);
     for (uint i = from; i < to; ++i) {

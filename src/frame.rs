@@ -5,7 +5,7 @@ use crate::{
     Error,
     input::Background,
     layers::{Kind, Surfaces},
-    passes::{Arrays, Points, compact, cull, extent, first_surface, occlude, shape, sort, surface},
+    passes::{Arrays, Points, compact, cull, extent, eye, first_surface, occlude, shape, sort, surface},
     plan::{Home, Plan},
     scale::Scale,
     scene::Scene,
@@ -34,6 +34,10 @@ pub(crate) fn plan(scene: &Scene) -> Result<Plan, Error> {
                 };
 
                 plan.work_for(Home::View, "visibility");
+                // Whether the eye is in the body: the maps do not tell.
+                if eye::wanted(scene) {
+                    eye::record(&mut plan, sorted.as_ref());
+                }
                 // Optics that upsample have the surfaces at half the picture's width and height (Cords08 §5).
                 plan.work_at(scene.scale());
                 // Which particles can show at all.

@@ -55,6 +55,28 @@ pub enum EnvironmentShape {
     Cube,
 }
 
+/// Whether the eye is inside the body: every ray then starts in it. Walks through maps of depths have to be told, since what is behind
+/// the eye is in none of them. A density field ([`crate::layers::field`]) knows by itself, and look-ups show fronts alone: for
+/// these nothing comes of what is said here, and nothing is done for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum EyeInside {
+    /// It is not.
+    #[default]
+    Outside,
+    /// It is: [`crate::prepare::DensityField`] has at least half of a filled body's density there, say.
+    Inside,
+    /// The device finds that out by the same measure, of [`FrameInput::positions`] as they are when the frame runs. Particles that the
+    /// host prepared are an error: there are no positions of theirs to look at.
+    OnDevice,
+}
+
+impl From<bool> for EyeInside {
+    fn from(inside: bool) -> EyeInside {
+        if inside { EyeInside::Inside } else { EyeInside::Outside }
+    }
+}
+
 /// The host's opaque scene, rendered before the liquid at the same size and with the same camera, of one sample a pixel: what was
 /// multisampled is resolved before, its depth by one of its samples (a mean of depths is nobody's). It hides liquid, is seen
 /// through it, and ends rays under water. Liquid whose wall lies up to three and a half radii (across that wall) before an
@@ -124,9 +146,8 @@ pub struct FrameInput<'a> {
     /// Host's own environment. One of the two is always needed; without this one it is that of
     /// [`crate::Renderer::set_environment`].
     pub environment: Option<EnvironmentInput>,
-    /// Whether the eye is inside the body (see [`crate::prepare::DensityField`]): every ray then starts in it. A density field
-    /// ([`crate::layers::field`]) knows by itself.
-    pub eye_inside: bool,
+    /// Whether the eye is inside the body.
+    pub eye_inside: EyeInside,
     /// Output, of one sample, of the format given to [`crate::Renderer::new`] and at least of the size given to
     /// [`crate::Renderer::resize`].
     pub output: vk::ImageView,
@@ -212,7 +233,7 @@ impl<'a> FrameInput<'a> {
             scene: None,
             background: Background::Environment,
             environment: None,
-            eye_inside: false,
+            eye_inside: EyeInside::Outside,
             output,
             output_layout: vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
             origin: [0, 0],
@@ -250,10 +271,10 @@ impl<'a> FrameInput<'a> {
         FrameInput { environment: environment.into(), ..self }
     }
 
-    /// The same with the eye inside the body, or outside.
+    /// The same with the eye inside the body (`true` will do), outside, or wherever the device finds it.
     #[must_use]
-    pub fn eye_inside(self, inside: bool) -> Self {
-        FrameInput { eye_inside: inside, ..self }
+    pub fn eye_inside(self, inside: impl Into<EyeInside>) -> Self {
+        FrameInput { eye_inside: inside.into(), ..self }
     }
 
     /// The same into another output.

@@ -39,6 +39,8 @@
 //!   scene does not need is an indirect draw or dispatch of nothing. Such a buffer, and those of ids
 //!   ([`prepare::DeviceIds`]) and of the number of particles, where only the device knows it ([`prepare::DeviceCount`]), are
 //!   the host's: its writes are visible to reads in compute shaders before the frame, which only reads them.
+//! * Where the eye is inside the liquid's body, walks through maps of depths have to be told ([`EyeInside`]): by the host, as
+//!   [`prepare::DensityField`] has it, or by the device, of positions there. A density field knows by itself.
 //! * The same input gives the same bits on the same driver; prepared on the host, in whatever order the particles come.
 //!
 //! # Spaces and units
@@ -115,8 +117,8 @@ pub use device::Host;
 pub use environment::{Equirect, EquirectBuilder};
 pub use error::Error;
 pub use input::{
-    Background, Before, DeviceVectors, EnvironmentInput, EnvironmentShape, FrameInput, Motion, MovingParticles,
-    SceneInput, SurfaceOutput, SurfaceOutputs,
+    Background, Before, DeviceVectors, EnvironmentInput, EnvironmentShape, EyeInside, FrameInput, Motion,
+    MovingParticles, SceneInput, SurfaceOutput, SurfaceOutputs,
 };
 pub use method::{Method, PRESETS, Preset};
 pub use optics::Fresnel;

@@ -7,7 +7,7 @@ use crate::{
     Error, access,
     device::{self, BINDING_ALIGNMENT, Host, Limits, bound},
     frame,
-    input::FrameInput,
+    input::{EyeInside, FrameInput},
     pipeline::Pipelines,
     plan::{Home, Made, Plan},
     prepare::{DevicePositions, Kept},
@@ -179,6 +179,7 @@ impl Renderer {
         scene.surface = input.surface.formats();
         scene.reactive = input.surface.reactive_value;
         (scene.has_scene, scene.eye) = (input.scene.is_some(), input.camera.view);
+        scene.eye_on_device = input.eye_inside == EyeInside::OnDevice;
         scene.space = input.positions.map_or(self.scene.space, |p| Space::new(p.radius, Vec3::ZERO));
         if let Some(p) = &input.positions {
             Amount::OnDevice(p).fill(&mut scene)?;
@@ -343,7 +344,7 @@ impl Renderer {
         block.count = scene.count;
         block.largest_point = self.limits.point_size as u32;
         block.quads_only = u32::from(input.settings.drawing.quads_only || !scene.points);
-        block.eye_inside = f32::from(input.eye_inside);
+        block.eye_inside = f32::from(input.eye_inside == EyeInside::Inside);
         if input.scene.is_some() || input.surface.depth.is_some() {
             let p = &input.camera.projection;
             block.scene_z_scale = p.z_axis.z;

@@ -43,6 +43,8 @@ pub(crate) struct Scene<'a> {
     pub reactive: f32,
     /// World to eye.
     pub eye: Mat4,
+    /// Whether the device has to find out if that is inside the body.
+    pub eye_on_device: bool,
     /// The liquid's own space; where the device prepares particles only its unit counts.
     pub space: Space,
     /// Whether what each walk met is written too.
@@ -98,6 +100,7 @@ impl<'a> Scene<'a> {
             moves: None,
             reactive: 0.0,
             eye: Mat4::IDENTITY,
+            eye_on_device: false,
             space: Space::new(1.0, Vec3::ZERO),
             walks: false,
             surface_read: false,

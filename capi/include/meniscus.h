@@ -58,6 +58,22 @@
 #define MENISCUS_ENVIRONMENT_CUBE 1
 
 /**
+ * MeniscusFrame::eye_inside: the eye is outside the body.
+ */
+#define MENISCUS_EYE_OUTSIDE 0
+
+/**
+ * MeniscusFrame::eye_inside: it is inside, where meniscus_density_at gives half at least, say. VK_TRUE is the same.
+ */
+#define MENISCUS_EYE_INSIDE 1
+
+/**
+ * MeniscusFrame::eye_inside: the device finds out, by the same measure, of MeniscusFrame::positions as they are when the frame runs.
+ * With particles that the host prepared a method that has to know is an error.
+ */
+#define MENISCUS_EYE_ON_DEVICE 2
+
+/**
  * meniscus_list: methods, for meniscus_settings_preset. The first is the default.
  */
 #define MENISCUS_LIST_PRESETS 0
@@ -567,9 +583,9 @@ typedef struct {
      */
     VkBool32 still;
     /**
-     * VK_TRUE if the eye is inside the body (meniscus_density_at): every ray then starts in it. A density field knows by itself.
+     * MENISCUS_EYE_...: whether the eye is inside the body; every ray then starts in it. A density field knows by itself.
      */
-    VkBool32 eye_inside;
+    uint32_t eye_inside;
     /**
      * What later passes are told of the first surface; or null.
      */

@@ -7,8 +7,8 @@ use crate::{
     versioned::{Versioned, borrow, read, read_some},
 };
 use renderer::{
-    Background, Before, Camera, DeviceVectors, EnvironmentInput, EnvironmentShape, FrameInput, Motion, MovingParticles,
-    SceneInput, Settings, SurfaceOutput, SurfaceOutputs,
+    Background, Before, Camera, DeviceVectors, EnvironmentInput, EnvironmentShape, EyeInside, FrameInput, Motion,
+    MovingParticles, SceneInput, Settings, SurfaceOutput, SurfaceOutputs,
     ash::vk::{
         Bool32 as VkBool32, Buffer as VkBuffer, DeviceSize as VkDeviceSize, Format as VkFormat,
         ImageLayout as VkImageLayout, ImageView as VkImageView,
@@ -28,6 +28,14 @@ pub const MENISCUS_BACKGROUND_HOST: u32 = 1;
 pub const MENISCUS_ENVIRONMENT_EQUIRECT: u32 = 0;
 /// MeniscusEnvironment::shape: a cube view.
 pub const MENISCUS_ENVIRONMENT_CUBE: u32 = 1;
+
+/// MeniscusFrame::eye_inside: the eye is outside the body.
+pub const MENISCUS_EYE_OUTSIDE: u32 = 0;
+/// MeniscusFrame::eye_inside: it is inside, where meniscus_density_at gives half at least, say. VK_TRUE is the same.
+pub const MENISCUS_EYE_INSIDE: u32 = 1;
+/// MeniscusFrame::eye_inside: the device finds out, by the same measure, of MeniscusFrame::positions as they are when the frame runs.
+/// With particles that the host prepared a method that has to know is an error.
+pub const MENISCUS_EYE_ON_DEVICE: u32 = 2;
 
 /// Positions in device memory, prepared within the frame that draws them: neighbours, classes, shapes, with no word about them to
 /// the host. How says the frame's settings (support, splash_threshold and so on).
@@ -310,8 +318,8 @@ pub struct MeniscusFrame {
     /// VK_TRUE if the particles are those of the frame recorded before and have not moved since: then what follows from them alone is
     /// kept.
     pub still: VkBool32,
-    /// VK_TRUE if the eye is inside the body (meniscus_density_at): every ray then starts in it. A density field knows by itself.
-    pub eye_inside: VkBool32,
+    /// MENISCUS_EYE_...: whether the eye is inside the body; every ray then starts in it. A density field knows by itself.
+    pub eye_inside: u32,
     /// What later passes are told of the first surface; or null.
     pub surface: *const MeniscusSurface,
     /// Where the view begins in the output and in the images of `surface`, in pixels: they may be larger than it. What is beside it
@@ -346,7 +354,7 @@ pub(crate) struct Read {
     output_layout: VkImageLayout,
     origin: [u32; 2],
     still: bool,
-    eye_inside: bool,
+    eye_inside: EyeInside,
     surface: SurfaceOutputs,
 }
 
@@ -368,6 +376,12 @@ impl Read {
             MENISCUS_BACKGROUND_ENVIRONMENT => Background::Environment,
             MENISCUS_BACKGROUND_HOST => Background::Host,
             other => return Err(unknown("MeniscusFrame::background", other, "MENISCUS_BACKGROUND_")),
+        };
+        let eye_inside = match f.eye_inside {
+            MENISCUS_EYE_OUTSIDE => EyeInside::Outside,
+            MENISCUS_EYE_INSIDE => EyeInside::Inside,
+            MENISCUS_EYE_ON_DEVICE => EyeInside::OnDevice,
+            other => return Err(unknown("MeniscusFrame::eye_inside", other, "MENISCUS_EYE_")),
         };
         let environment = match environment {
             None => None,
@@ -397,7 +411,7 @@ impl Read {
             },
             origin: f.origin,
             still: f.still != 0,
-            eye_inside: f.eye_inside != 0,
+            eye_inside,
             surface,
         })
     }

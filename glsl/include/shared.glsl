@@ -100,6 +100,9 @@
 // The same for a run of the relation table: 27 cells hold 216 in liquid at rest, and twice as wide 1728.
 #define CROWD_RELATION 8192
 
+// The eye is inside the body from this number density on, as a part of a filled body's: that of a flat surface.
+#define EYE_INSIDE 0.5
+
 // Particles that one invocation prepares together, one in each component of a vector.
 #define SHAPE_RUN 4
 

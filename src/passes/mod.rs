@@ -4,6 +4,7 @@
 pub(crate) mod compact;
 pub(crate) mod cull;
 pub(crate) mod extent;
+pub(crate) mod eye;
 pub(crate) mod first_surface;
 pub(crate) mod motion;
 pub(crate) mod occlude;

@@ -114,7 +114,7 @@ impl Renderer {
                 let plain = DevicePositions::packed(vk::Buffer::null(), 1, 1.0).options(options);
                 let kept = plain.keep_class_below(1.0);
                 for positions in [plain, kept, kept.ids(DeviceIds::packed(vk::Buffer::null(), 1))] {
-                    let mut scene = scene([0, 0]);
+                    let mut scene = Scene { eye_on_device: true, ..scene([0, 0]) };
                     Amount::OnDevice(&positions).fill(&mut scene)?;
                     scenes.push(scene);
                 }

@@ -5,6 +5,7 @@ pub mod background;
 pub mod compact;
 pub mod cull;
 pub mod extent;
+pub mod eye;
 pub mod field_walk;
 pub mod first_surface;
 pub mod motion;

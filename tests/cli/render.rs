@@ -170,6 +170,23 @@ fn a_camera_inside_the_liquid_sees_out() {
     assert!(stats["patterns"]["no liquid"].as_u64().unwrap() < 96 * 72 / 100, "{}", stats["patterns"]);
 }
 
+/// Whether the eye is in the liquid is found out where particles are prepared, by maps, which have to be told.
+#[test]
+fn the_eye_is_looked_for_where_particles_are_prepared() {
+    let run = Run::new();
+    let block = run.file("block.csv", block(0.0));
+    let eye = ["--eye", "0.25,0.25,0.25", "--target", "0.25,0.3,1", "--stats", "s.json"];
+    for (prepare, method, on_device) in
+        [("cpu", "imai16", false), ("gpu", "imai16", true), ("gpu-relation", "imai16", true), ("gpu", "field", false)]
+    {
+        let args = [&block, "--radius", "0.05", "--prepare", prepare, "--method", method];
+        run.render(&[&args[..], &eye].concat());
+        let stats: serde_json::Value = serde_json::from_slice(&fs::read(run.path("s.json")).unwrap()).unwrap();
+        let mut passes = stats["gpu"]["passes"].as_array().expect("passes").iter();
+        assert_eq!(passes.any(|p| p["pass"] == "eye"), on_device, "{prepare}, {method}");
+    }
+}
+
 #[test]
 fn no_particles_give_the_background_and_say_so() {
     let run = Run::new();

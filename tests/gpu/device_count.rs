@@ -101,6 +101,10 @@ fn what_lies_behind_is_not_there() {
             let none = frame(&long, positions.len(), keep, Some(0));
             assert!(none.picture == frame(&short, 0, keep, None).picture, "{}", label("none"));
             assert_eq!((none.counter("splash"), none.counter("body")), (0, 0), "{}", label("none"));
+            // Points and quads of each list; nothing of what the frame before drew.
+            for draws in none.words("indirect draws", 0).into_iter().flat_map(|words| words.chunks_exact(8)) {
+                assert_eq!((draws[0], draws[5]), (0, 0), "{}", label("none drawn"));
+            }
         }
     });
 }

@@ -18,6 +18,7 @@ mod drivers;
 mod environment;
 mod extent;
 mod external_memory;
+mod eye;
 mod field;
 mod field_walk;
 mod first_surface;

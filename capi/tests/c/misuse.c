@@ -262,6 +262,27 @@ static void draw(const Vulkan *vk, VkCommandBuffer cmd, MeniscusRenderer *render
     memcpy(pixels, readback->bytes, 4 * WIDTH * HEIGHT);
 }
 
+/* An eye between particles on the device: maps have to be told where it is, and the device finds out. */
+static void look_around(const Vulkan *vk, VkCommandBuffer cmd, MeniscusRenderer *renderer, MeniscusFrame frame, const Image *picture,
+                        const Buffer *readback) {
+    static unsigned char pictures[3][4 * WIDTH * HEIGHT];
+    const float eye[3] = {0.1f, 0.1f, 0.1f}, target[3] = {1, 0.5f, -2}, up[3] = {0, 1, 0};
+    MeniscusCamera camera = {.struct_size = sizeof camera};
+    OK(meniscus_camera_look_at(&camera, eye, target, up, 0.7f, (float)WIDTH / HEIGHT, 0.005f));
+    MeniscusSettings *maps;
+    OK(meniscus_settings_create(&maps));
+    OK(meniscus_settings_preset(maps, "imai16"));
+    frame.camera = &camera, frame.settings = maps;
+    const uint32_t said[3] = {MENISCUS_EYE_OUTSIDE, MENISCUS_EYE_INSIDE, MENISCUS_EYE_ON_DEVICE};
+    for (int i = 0; i < 3; i++) {
+        frame.eye_inside = said[i];
+        draw(vk, cmd, renderer, &frame, picture, readback, pictures[i]);
+    }
+    TRUE(memcmp(pictures[0], pictures[1], sizeof pictures[0]) != 0);
+    TRUE(memcmp(pictures[1], pictures[2], sizeof pictures[0]) == 0);
+    OK(meniscus_settings_destroy(maps));
+}
+
 static void frames(const Vulkan *vk, MeniscusRenderer *renderer, const MeniscusSettings *settings) {
     const float eye[3] = {0.5f, 1.0f, 4.0f}, target[3] = {0, 0, 0}, up[3] = {0, 1, 0};
     const float map[2][3] = {{0.2f, 0.4f, 0.9f}, {0.9f, 0.5f, 0.1f}};
@@ -308,6 +329,8 @@ static void frames(const Vulkan *vk, MeniscusRenderer *renderer, const MeniscusS
     PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "slot is 5");
     f = good, f.background = 7;
     PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "MENISCUS_BACKGROUND_");
+    f = good, f.eye_inside = 3;
+    PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "MeniscusFrame::eye_inside is 3: use one of MENISCUS_EYE_");
     const MeniscusCamera flat = {.struct_size = sizeof flat};
     f = good, f.camera = &flat;
     PARAMETER(meniscus_renderer_record(renderer, cmd, &f), "camera view");
@@ -404,6 +427,7 @@ static void frames(const Vulkan *vk, MeniscusRenderer *renderer, const MeniscusS
     TRUE(memcmp(pictures[0], pictures[1], sizeof pictures[0]) != 0);
     TRUE(memcmp(pictures[1], pictures[2], sizeof pictures[0]) == 0);
     TRUE(memcmp(pictures[0], pictures[3], sizeof pictures[0]) != 0);
+    look_around(vk, cmd, renderer, f, &picture, &readback);
     choose(renderer, &f);
     begin(vk, cmd);
     later.more = 1;

@@ -5,7 +5,7 @@ use clap::ValueEnum;
 use glam::{DVec3, Mat3, Vec3};
 use indicatif::{ProgressBar, ProgressStyle};
 use meniscus::{
-    Camera, Class, Ellipsoid, FrameInput, Particles, Point, Renderer, Settings,
+    Camera, Class, Ellipsoid, EyeInside, FrameInput, Particles, Point, Renderer, Settings,
     ash::vk::ImageView,
     host::{Session, Upload},
     io::particles::{Invalid, ParticleFile, ReadError, check_finite, read_bytes, read_within},
@@ -226,14 +226,19 @@ impl Scene {
         upload: Option<&Upload>,
     ) -> FrameInput<'a> {
         let mut input = FrameInput::new(0, camera, settings, ImageView::null());
-        input.eye_inside = self.inside(eye);
+        input.eye_inside = self.eye_inside(eye, upload.is_some());
         input.positions = upload.map(|u| self.on_device(u));
         input
     }
 
+    /// What a frame is told of an eye: where its positions are on the device, to look itself.
+    pub fn eye_inside(&self, eye: Vec3, on_device: bool) -> EyeInside {
+        if on_device { EyeInside::OnDevice } else { self.inside(eye).into() }
+    }
+
     /// Whether a point (relative to the origin) is inside the body: half as dense as a filled body.
     pub fn inside(&self, point: Vec3) -> bool {
-        self.density.as_ref().is_some_and(|d| d.relative_density(point) >= 0.5)
+        self.density.as_ref().is_some_and(|d| d.relative_density(point) >= shader::EYE_INSIDE)
     }
 }
 

@@ -117,7 +117,7 @@ impl<'a> Pane<'a> {
         let input = FrameInput::new(slot, &camera, &settings, canvas.view)
             .positions(self.positions.as_ref().map(|upload| scene.on_device(upload)))
             .still(self.still)
-            .eye_inside(scene.inside(eye));
+            .eye_inside(scene.eye_inside(eye, self.positions.is_some()));
         let (undefined, drawn) = (vk::ImageLayout::UNDEFINED, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
         canvas.transition(cmd, undefined, drawn);
         let renderer = self.renderer.as_mut().expect("there until it ends");
