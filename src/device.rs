@@ -141,20 +141,26 @@ pub(crate) fn largest_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
     local.map(|h| h.size).max().unwrap_or(0)
 }
 
-impl Host {
-    pub(crate) fn limits(&self) -> Limits {
-        // SAFETY: `Host` promises a live instance and a physical device of it.
+impl Limits {
+    /// What a physical device says. It has to be the instance's.
+    pub fn of(
+        instance: &ash::Instance,
+        physical_device: vk::PhysicalDevice,
+        family: u32,
+        large_points: bool,
+    ) -> Limits {
+        // SAFETY: the caller keeps the instance alive, and the physical device is its own.
         let (properties, families) = unsafe {
             (
-                self.instance.get_physical_device_properties(self.physical_device),
-                self.instance.get_physical_device_queue_family_properties(self.physical_device),
+                instance.get_physical_device_properties(physical_device),
+                instance.get_physical_device_queue_family_properties(physical_device),
             )
         };
         // SAFETY: as above.
-        let memory = unsafe { self.instance.get_physical_device_memory_properties(self.physical_device) };
-        let bits = families.get(self.queue_family as usize).map_or(0, |f| f.timestamp_valid_bits);
+        let memory = unsafe { instance.get_physical_device_memory_properties(physical_device) };
+        let bits = families.get(family as usize).map_or(0, |f| f.timestamp_valid_bits);
         Limits {
-            point_size: if self.large_points { properties.limits.point_size_range[1] } else { 1.0 },
+            point_size: if large_points { properties.limits.point_size_range[1] } else { 1.0 },
             image_size: properties.limits.max_image_dimension2_d.min(properties.limits.max_framebuffer_width),
             timestamp_period: (bits > 0).then_some(properties.limits.timestamp_period),
             timestamp_mask: if bits >= 64 { u64::MAX } else { (1u64 << bits) - 1 },
@@ -163,6 +169,12 @@ impl Host {
             memory: largest_heap(&memory),
             cpu: properties.device_type == vk::PhysicalDeviceType::CPU,
         }
+    }
+}
+
+impl Host {
+    pub(crate) fn limits(&self) -> Limits {
+        Limits::of(&self.instance, self.physical_device, self.queue_family, self.large_points)
     }
 
     /// Checks that a format can be a colour attachment, with blending if that is asked for.

@@ -5,15 +5,15 @@ mod uploads;
 
 use crate::{
     Error, access,
-    device::{self, BINDING_ALIGNMENT, Host, Limits, bound},
+    device::{self, Host, Limits, bound},
     frame,
     input::{EyeInside, FrameInput},
     pipeline::Pipelines,
-    plan::{Home, Made, Plan},
-    prepare::{DevicePositions, Kept},
+    plan::Home,
+    prepare::Kept,
     profile::FrameTimes,
     recorder::{Externals, PlanEntry, Recorder},
-    resources::{Buffer, Resource, Retired, Spec},
+    resources::{Buffer, Resource, Retired},
     scale::Scale,
     scene::Scene,
     slot::Slot,
@@ -22,7 +22,9 @@ use crate::{
     work::WorkEntry,
 };
 pub use ahead::Amount;
-use ahead::check_memory;
+#[cfg(feature = "host")]
+pub(crate) use ahead::check_amount;
+use ahead::{check_bindings, check_memory};
 use ash::vk;
 use glam::{Vec2, Vec3};
 use uploads::Footprints;
@@ -194,27 +196,6 @@ impl Renderer {
         Ok(scene)
     }
 
-    /// Refuses particles whose buffers the device cannot bind.
-    fn check_bindings(&self, plan: &Plan, count: u32, positions: Option<&DevicePositions>) -> Result<(), Error> {
-        let largest = self.limits.storage_size;
-        let asked = |stride| BINDING_ALIGNMENT + stride * u64::from(count);
-        let given = positions.into_iter().flat_map(|p| {
-            [("positions (host's)", asked(p.stride)), ("ids (host's)", p.ids.map_or(0, |ids| asked(ids.stride)))]
-        });
-        let entries = positions.map_or(0, DevicePositions::entries);
-        let buffers = plan.resources.iter().filter_map(|r| match r.made {
-            Made::Own(Spec::Buffer { bytes, .. }) => Some((r.name, bytes)),
-            _ => None,
-        });
-        for (name, bytes) in buffers.chain(given) {
-            if bytes > largest || entries > u64::from(u32::MAX) {
-                let remedy = format!("{name} would take {bytes} bytes; this device binds {largest} at most");
-                return Err(Error::parameter("particles", count, remedy));
-            }
-        }
-        Ok(())
-    }
-
     /// Refuses a view that cannot lie where it is said to begin.
     fn check_origins(&self, input: &FrameInput, walks: bool) -> Result<(), Error> {
         let origins = [("origin", Some(input.origin)), ("origin of the scene", input.scene.map(|s| s.origin))];
@@ -308,7 +289,7 @@ impl Renderer {
             p.anew = kept != self.last_classes;
         }
         let mut plan = frame::plan(&scene)?;
-        self.check_bindings(&plan, scene.count, input.positions.as_ref())?;
+        check_bindings(&self.limits, &plan, scene.count, input.positions.as_ref())?;
         input.check_handles()?;
         self.check_origins(input, scene.walks)?;
         check_memory(&self.host, &self.limits, &self.tables, &plan)?;

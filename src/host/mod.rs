@@ -8,7 +8,12 @@ mod tools;
 mod upload;
 mod validation;
 
-use crate::{Error, device, error::remedy};
+use crate::{
+    Error, Settings,
+    device::{self, Limits},
+    error::remedy,
+    renderer::{Amount, check_amount},
+};
 use ash::vk;
 pub use canvas::Canvas;
 pub use gpu::Gpu;
@@ -115,12 +120,19 @@ pub struct DeviceInfo {
     rank: u32,
     handle: vk::PhysicalDevice,
     family: u32,
+    limits: Limits,
 }
 
 impl DeviceInfo {
     /// The physical device, of the instance that listed it.
     pub fn handle(&self) -> vk::PhysicalDevice {
         self.handle
+    }
+
+    /// Refuses so many particles as no frame of this size and these settings can draw here: before they are prepared, which may take
+    /// minutes, where [`crate::Renderer::set_particles`] and [`crate::Renderer::record`] would refuse them after it.
+    pub fn check_amount(&self, size: [u32; 2], amount: Amount, settings: &Settings) -> Result<(), Error> {
+        check_amount(&self.limits, size, amount, settings)
     }
 
     /// The queue family that is used: graphics and compute.
@@ -282,6 +294,7 @@ impl Instance {
             rank,
             handle,
             family,
+            limits: Limits::of(&self.handle, handle, family, features.large_points != 0),
         }
     }
 

@@ -12,6 +12,7 @@ mod blosc;
 mod collection;
 mod contents;
 mod csv;
+mod error;
 mod lammps;
 mod numbers;
 mod numpy;
@@ -28,7 +29,6 @@ mod vtk_xml_blocks;
 mod vtk_xml_data;
 mod xyz;
 
-use std::fmt;
 use std::fs::File;
 use std::io::{BufReader, Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -36,10 +36,11 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec3};
 
 use super::budget::{Budget, Ledger, OverBudget};
-use super::{guard, quote};
-pub use collection::time_steps;
+use super::guard;
+pub use collection::{TimeStep, has_steps, time_step, time_steps};
 use contents::Notes;
 pub use contents::{ArrayInfo, Contents};
+pub use error::{At, ReadError};
 use source::{Input, Source};
 
 /// The known extensions, lower case and without dot, each with what is read from it.
@@ -55,7 +56,10 @@ pub const FORMATS: &[(&str, &str)] = &[
     ("vtm", "VTK XML blocks, which are joined; names of files"),
     ("vtpd", "VTK XML partitions, as .vtm"),
     ("vtpc", "collections of these, as .vtm"),
-    ("pvd", "ParaView collection: of one time, whose files are joined; of several, for `meniscus sequence`"),
+    (
+        "pvd",
+        "ParaView collection: of one time, whose files are joined; of several, by `--time` or all of them by `meniscus sequence`",
+    ),
     ("ply", "PLY, ASCII or binary: element `vertex` with x, y, z; properties `class`, `id`, vx, vy, vz"),
     (
         "bgeo",
@@ -162,96 +166,6 @@ pub enum Invalid {
     Reject,
     /// Remove these particles.
     Drop,
-}
-
-/// A place in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum At {
-    /// Not known.
-    Unknown,
-    /// Line, counted from 1.
-    Line(u64),
-    /// Byte offset, counted from 0.
-    Byte(u64),
-}
-
-impl fmt::Display for At {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            At::Unknown => Ok(()),
-            At::Line(line) => write!(f, ", line {line}"),
-            At::Byte(byte) => write!(f, ", byte {byte}"),
-        }
-    }
-}
-
-/// Why a particle file could not be read.
-#[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the fields are what the messages show")]
-pub enum ReadError {
-    /// There is no such file.
-    #[error("{}: no such file; check the path", quote::path(path))]
-    NotFound { path: PathBuf },
-    /// The path is a directory.
-    #[error("{}: is a directory; name one particle file in it", quote::path(path))]
-    IsDirectory { path: PathBuf },
-    /// The system does not let it be read.
-    #[error("{}: cannot be read ({source}); check its permissions", quote::path(path))]
-    Unreadable { path: PathBuf, source: std::io::Error },
-    /// It has no bytes at all.
-    #[error("{}: is empty (0 bytes); write it again", quote::path(path))]
-    Empty { path: PathBuf },
-    /// Its extension is none of [`FORMATS`].
-    #[error(
-        "{}: unknown extension `{}`; convert to, or rename to the true one of: {}",
-        quote::path(path),
-        quote::quote(extension),
-        known_extensions()
-    )]
-    UnknownExtension { path: PathBuf, extension: String },
-    /// It is truncated, corrupt, or not what its extension says.
-    #[error("{}{at}: {detail}; {remedy}", quote::path(path))]
-    Malformed { path: PathBuf, at: At, detail: String, remedy: &'static str },
-    /// It is valid, but without the array, columns or element that positions are read from.
-    #[error("{}: holds no positions: {wanted}, found {found}; rename or export them", quote::path(path))]
-    NoPositions { path: PathBuf, wanted: &'static str, found: String },
-    /// An array has dimensions or a type that cannot be used.
-    #[error("{}: `{array}` is {found}, expected {expected}; reshape or convert it", quote::path(path))]
-    WrongShape { path: PathBuf, array: String, found: String, expected: &'static str },
-    /// An array has not one entry for each particle.
-    #[error(
-        "{}: `{array}` has {found} entries for {expected} particles; export all arrays from the same frame",
-        quote::path(path)
-    )]
-    UnequalLengths { path: PathBuf, array: String, found: usize, expected: usize },
-    /// Positions or velocities are infinite or not a number.
-    #[error(
-        "{}: {count} of {total} particles have a position or velocity that is not finite, the first at index {first}; `--drop-invalid` leaves them out",
-        quote::path(path)
-    )]
-    NonFinite { path: PathBuf, first: usize, count: usize, total: usize },
-    /// Reading it takes more memory than its [`Budget`].
-    #[error("{}: {source}", quote::path(path))]
-    TooLarge { path: PathBuf, source: OverBudget },
-    /// A collection has several times, and one picture is of one.
-    #[error(
-        "{}: holds {count} time steps, from {first} to {last}; name one of its files, or render all by `meniscus sequence`",
-        quote::path(path)
-    )]
-    Steps { path: PathBuf, count: usize, first: f64, last: f64 },
-    /// A file that a collection names.
-    #[error("{}: it names a file that cannot be read: {source}", quote::path(path))]
-    Member { path: PathBuf, source: Box<ReadError> },
-    /// A parser panicked (in programs that unwind).
-    #[error(
-        "{}: reading it failed in a way that nobody foresaw; export it again, and report it if other programs read it",
-        quote::path(path)
-    )]
-    Panicked { path: PathBuf, panic: String },
-}
-
-fn known_extensions() -> String {
-    FORMATS.iter().map(|(extension, _)| *extension).collect::<Vec<_>>().join(", ")
 }
 
 /// Reads the particle file at `path`, in the format its extension (in either case) says, within the default [`Budget`].

@@ -2,15 +2,16 @@
 
 use super::{
     HOMES, Renderer,
-    uploads::{PARTICLE_ARRAYS, POINTS, SPEEDS},
+    uploads::{PARTICLE_ARRAYS, POINTS, SPEEDS, check_count, check_most_points, check_points_count},
 };
 use crate::{
     Error, Settings,
     device::{BINDING_ALIGNMENT, Host, Limits},
     frame,
     input::{Background, EnvironmentShape, FrameInput},
-    plan::Plan,
+    plan::{Made, Plan},
     prepare::{self, DeviceIds, DevicePositions, Search},
+    resources::Spec,
     scene::{Preparation, Scene},
     table::{self, LedgerEntry, Table},
 };
@@ -69,6 +70,14 @@ impl Renderer {
         let mut scene = Scene::new(settings, size, [0, 0], &self.limits);
         amount.fill(&mut scene)?;
         Ok(table::ledger(&self.host.device, &frame::plan(&scene)?))
+    }
+
+    /// Refuses so many particles as no frame of this size and these settings can draw, before they are prepared, which may take
+    /// minutes: [`Renderer::set_particles`] and [`Renderer::record`] would refuse them after it. Whether there is memory for them is not looked
+    /// at.
+    pub fn check_amount(&self, size: [u32; 2], amount: Amount, settings: &Settings) -> Result<(), Error> {
+        self.check_size(size)?;
+        check_amount(&self.limits, size, amount, settings)
     }
 
     /// Device memory in use now, resource by resource.
@@ -135,6 +144,51 @@ impl Renderer {
     }
 }
 
+/// Refuses so many particles as no frame of this size and these settings can draw on a device, before they are prepared.
+pub(crate) fn check_amount(limits: &Limits, size: [u32; 2], amount: Amount, settings: &Settings) -> Result<(), Error> {
+    settings.validate()?;
+    let positions = match amount {
+        Amount::Prepared { splash, body } => {
+            check_count(limits, splash + body)?;
+            if settings.method.layers.field().is_some() {
+                check_points_count(limits, splash + body)?;
+            }
+            None
+        }
+        Amount::OnDevice(positions) => Some(positions),
+    };
+    let mut scene = Scene::new(settings, size, [0, 0], limits);
+    amount.fill(&mut scene)?;
+    check_most_points(&scene)?;
+    check_bindings(limits, &frame::plan(&scene)?, scene.count, positions)
+}
+
+/// Refuses particles whose buffers the device cannot bind.
+pub(super) fn check_bindings(
+    limits: &Limits,
+    plan: &Plan,
+    count: u32,
+    positions: Option<&DevicePositions>,
+) -> Result<(), Error> {
+    let largest = limits.storage_size;
+    let asked = |stride| BINDING_ALIGNMENT + stride * u64::from(count);
+    let given = positions.into_iter().flat_map(|p| {
+        [("positions (host's)", asked(p.stride)), ("ids (host's)", p.ids.map_or(0, |ids| asked(ids.stride)))]
+    });
+    let entries = positions.map_or(0, DevicePositions::entries);
+    let buffers = plan.resources.iter().filter_map(|r| match r.made {
+        Made::Own(Spec::Buffer { bytes, .. }) => Some((r.name, bytes)),
+        _ => None,
+    });
+    for (name, bytes) in buffers.chain(given) {
+        if bytes > largest || entries > u64::from(u32::MAX) {
+            let remedy = format!("{name} would take {bytes} bytes; this device binds {largest} at most");
+            return Err(Error::parameter("particles", count, remedy));
+        }
+    }
+    Ok(())
+}
+
 /// Refuses a frame that does not fit the device, before anything is made for it.
 pub(super) fn check_memory(host: &Host, limits: &Limits, tables: &[Table; 2], plan: &Plan) -> Result<(), Error> {
     if tables.iter().zip(HOMES).all(|(table, home)| table.fits(plan, home)) {
@@ -144,5 +198,48 @@ pub(super) fn check_memory(host: &Host, limits: &Limits, tables: &[Table; 2], pl
     match needed.checked_sub(limits.memory) {
         None | Some(0) => Ok(()),
         Some(missing) => Err(Error::MemoryShort { needed, available: limits.memory, missing }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Method;
+
+    /// lavapipe's.
+    const LIMITS: Limits = Limits {
+        point_size: 255.0,
+        image_size: 16384,
+        timestamp_period: None,
+        timestamp_mask: 0,
+        storage_size: 128 << 20,
+        texels_size: 16 * (128 << 20),
+        memory: 1 << 34,
+    };
+
+    fn refused(method: &str, amount: Amount) -> Option<String> {
+        let settings = Settings { method: Method::preset(method).expect("a preset"), ..Settings::default() };
+        check_amount(&LIMITS, [640, 480], amount, &settings).err().map(|e| e.to_string())
+    }
+
+    #[test]
+    fn more_particles_than_a_device_binds_are_refused_ahead() {
+        let bodies = |body| Amount::Prepared { splash: 0, body };
+        // Three floats each are bound of all, four of those of a field.
+        let [all, field] = [12, 16].map(|each| (128 << 20) / each);
+        assert_eq!(refused("field", bodies(1000)), None);
+        assert_eq!(refused("imai16", bodies(1000)), None);
+        let said = refused("field", bodies(field + 1)).expect("too many");
+        assert!(said.contains("8388609") && said.contains("holds 8388608 at most"), "{said}");
+        let said = refused("imai16", bodies(all + 1)).expect("too many");
+        assert!(said.contains(&format!("holds {all} at most")), "{said}");
+        // What the device prepares is bound where it lies: alone it would fit.
+        let positions = DevicePositions::packed(vk::Buffer::null(), all as u32, 1.0);
+        let said = refused("imai16", Amount::OnDevice(&positions)).expect("too many");
+        assert!(said.contains("would take") && said.contains("binds 134217728 at most"), "{said}");
+        let few = DevicePositions::packed(vk::Buffer::null(), 1000, 1.0);
+        assert_eq!(refused("imai16", Amount::OnDevice(&few)), None);
+        // Of large pictures no more than of small ones hangs on particles.
+        assert_eq!(refused("imai16", bodies(0)), None);
     }
 }

@@ -4,6 +4,7 @@ use super::{Renderer, SceneBounds};
 use crate::{
     Error, access,
     allocator::Location,
+    device::Limits,
     environment::{Equirect, footprints},
     layers::{Kind, field::MOST_POINTS},
     particles::{Class, Particles, Point},
@@ -32,10 +33,7 @@ impl Renderer {
                 format!("there are {count} particles"),
             ));
         }
-        let most = (self.limits.storage_size / ARRAY_BYTES).min(MOST_PARTICLES);
-        if count as u64 > most {
-            return Err(Error::parameter("particles", count, format!("this device holds {most} at most")));
-        }
+        check_count(&self.limits, count)?;
         let mut made = Vec::with_capacity(3);
         for name in PARTICLE_ARRAYS {
             let bytes = ARRAY_BYTES * count.max(1) as u64;
@@ -112,11 +110,8 @@ impl Renderer {
             let remedy = "use finite positions, and finite densities above 0";
             return Err(Error::parameter("points", format!("number {i} is {:?}", points[i]), remedy));
         }
+        check_points_count(&self.limits, count)?;
         let (bytes, usage) = (POINT_BYTES * count.max(1) as u64, vk::BufferUsageFlags::STORAGE_BUFFER);
-        if bytes > self.limits.storage_size {
-            let most = self.limits.storage_size / POINT_BYTES;
-            return Err(Error::parameter("points", count, format!("this device holds {most} at most")));
-        }
         let mut buffer = Buffer::new(&self.host, POINTS, bytes, usage, Location::Upload)?;
         let unit = space::power_of_two(self.scene.space.radius as f32);
         for (p, to) in points.iter().zip(buffer.mapped().chunks_exact_mut(POINT_BYTES as usize)) {
@@ -132,12 +127,8 @@ impl Renderer {
 
     /// Refuses a frame that needs points and has none, or too many.
     pub(super) fn check_points(&self, scene: &Scene) -> Result<(), Error> {
-        let needed = matches!(scene.settings.method.layers.member().kind(), Kind::Field(_));
-        if needed && scene.count > MOST_POINTS {
-            let remedy = format!("a density field takes {MOST_POINTS} at most");
-            return Err(Error::parameter("particles", scene.count, remedy));
-        }
-        if !needed || scene.count == 0 || scene.prepare.is_some() || self.points.is_some() {
+        check_most_points(scene)?;
+        if !has_points(scene) || scene.count == 0 || scene.prepare.is_some() || self.points.is_some() {
             return Ok(());
         }
         let remedy =
@@ -218,6 +209,37 @@ impl Renderer {
         }
         Ok(())
     }
+}
+
+/// Refuses more particles than a device holds.
+pub(super) fn check_count(limits: &Limits, count: usize) -> Result<(), Error> {
+    let most = (limits.storage_size / ARRAY_BYTES).min(MOST_PARTICLES);
+    if count as u64 > most {
+        return Err(Error::parameter("particles", count, format!("this device holds {most} at most")));
+    }
+    Ok(())
+}
+
+/// Refuses more points than a device holds.
+pub(super) fn check_points_count(limits: &Limits, count: usize) -> Result<(), Error> {
+    let most = limits.storage_size / POINT_BYTES;
+    if count as u64 > most {
+        return Err(Error::parameter("points", count, format!("this device holds {most} at most")));
+    }
+    Ok(())
+}
+
+/// Refuses more particles than a density field takes, if that is what is drawn.
+pub(super) fn check_most_points(scene: &Scene) -> Result<(), Error> {
+    if has_points(scene) && scene.count > MOST_POINTS {
+        let remedy = format!("a density field takes {MOST_POINTS} at most");
+        return Err(Error::parameter("particles", scene.count, remedy));
+    }
+    Ok(())
+}
+
+fn has_points(scene: &Scene) -> bool {
+    matches!(scene.settings.method.layers.member().kind(), Kind::Field(_))
 }
 
 /// The environment as it was uploaded.

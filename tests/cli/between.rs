@@ -8,7 +8,7 @@ fn place(time: f64) -> (f64, f64) {
     (0.1 * time * time, 0.2 * time)
 }
 
-fn moving(time: f64) -> String {
+pub fn moving(time: f64) -> String {
     let (offset, speed) = place(time);
     let rows = block(offset);
     let rows = rows.lines().skip(1).map(|row| format!("{row},{speed},0,0\n"));
@@ -30,12 +30,12 @@ fn made(run: &Run, more: &[&str]) -> String {
     text(&output)
 }
 
-fn linear(run: &Run, name: &str) -> Vec<f32> {
+pub fn linear(run: &Run, name: &str) -> Vec<f32> {
     image::open(run.path(name)).expect("a picture").to_rgb32f().into_raw()
 }
 
 /// The picture of the block at a second.
-fn rendered(run: &Run, time: f64) -> Vec<f32> {
+pub fn rendered(run: &Run, time: f64) -> Vec<f32> {
     run.file("now.csv", moving(time));
     let args = [&["render", "now.csv", "-o", "now.exr", "--size", "96x72"], GIVEN].concat();
     assert!(run.command(&args).status.success());
@@ -43,7 +43,7 @@ fn rendered(run: &Run, time: f64) -> Vec<f32> {
 }
 
 /// How much of the values are apart by more than rounding leaves.
-fn apart(a: &[f32], b: &[f32]) -> f64 {
+pub fn apart(a: &[f32], b: &[f32]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).filter(|(a, b)| (**a - **b).abs() > 0.01).count() as f64 / a.len() as f64
 }

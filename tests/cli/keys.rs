@@ -106,7 +106,6 @@ fn keys_that_cannot_be_are_refused() {
     refused("[[keys]]\ntime = 1\nsettings.liquid.colour = 1", &["settings.liquid.colour"]);
     refused("[[keys]]\ntime = 0\n[[keys]]\ntime = 2\nsettings.liquid.ior = 0.5", &["ior", "above 1"]);
     refused("[[keys]]\ntime = 2\n[[keys]]\ntime = 1", &["keys[1].time", "later"]);
-    run.refused(2, &["render", "-o", "a.png", "--time", "1"], &["--scene"]);
     run.file("s.toml", "");
     run.refused(1, &["sequence", "f/*.csv", "-o", "#.png", "--scene", "s.toml", "--time", "1"], &["--time"]);
 }

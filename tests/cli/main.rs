@@ -25,6 +25,7 @@ mod stress;
 mod study;
 mod submit;
 mod terminal;
+mod time_steps;
 #[cfg(feature = "study")]
 mod tune;
 #[cfg(feature = "study")]

@@ -124,14 +124,16 @@ fn memory_ends_with_other_particles() {
     run.refused(2, &["sequence", "f/*.csv", "-o", "#.png", "--keep-class-below", "0.5"], &["--memory"]);
 }
 
-/// Three rows that tremble, three that do not, and eight other splashes in each frame, which come before all by their ids or after.
+/// Three rows that tremble, three that do not, of which one is of other particles in each frame, and eight other splashes, which come
+/// before all by their ids or after.
 fn renewed(run: &Run, folder: &str, shuffled: bool) {
     fs::create_dir_all(run.path(folder)).expect("folder");
     for frame in 0..5_u32 {
         let mut rows = Vec::new();
         for (row, i) in (0..6).flat_map(|row| (0..8).map(move |i| (row, i))) {
             let spacing = if frame % 2 == 1 && row < 3 { 0.1015 } else { 0.0985 };
-            rows.push(format!("{},{},{},0.2\n", 1000 + 8 * row + i, spacing * f64::from(i), 0.4 * f64::from(row)));
+            let id = if row == 5 { 5000 + 8 * frame + i } else { 1000 + 8 * row + i };
+            rows.push(format!("{id},{},{},0.2\n", spacing * f64::from(i), 0.4 * f64::from(row)));
         }
         for i in 0..8 {
             rows.push(format!("{},{},9,9\n", 2000 * (frame % 2) + 10 * frame + i, i));

@@ -1,9 +1,9 @@
 //! Sequences: the pictures that `render` makes, in order, each once.
 
-use crate::{Run, block, listing, text};
+use crate::{Run, between::moving, block, listing, text};
 use std::{
     fs,
-    process::Stdio,
+    process::{Command, Output, Stdio},
     time::{Duration, Instant},
 };
 
@@ -124,7 +124,7 @@ fn ended_and_started_again_it_is_what_it_is_in_one_go() {
         // Not two of these moments are alike.
         let now = Instant::now().duration_since(begin).subsec_nanos();
         std::thread::sleep(whole * (2 + now % 3) / 10);
-        let _ = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+        let _ = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
         child.wait().expect("waited for");
         for name in listing(&run.path("out")) {
             if let Some(number) = name.strip_suffix(".png") {
@@ -202,13 +202,96 @@ fn a_frame_that_cannot_be_read_ends_it_or_is_left_out() {
     assert!(made(&run, &sequence(&[])).contains("wrote 1 pictures"));
 }
 
+/// What a program says that ends within a time; one that does not is killed.
+#[cfg(unix)]
+fn ended(mut program: Command, within: Duration) -> Option<Output> {
+    let mut child = program.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("starts");
+    let begin = Instant::now();
+    while child.try_wait().expect("waited for").is_none() {
+        if begin.elapsed() > within {
+            child.kill().expect("killed");
+            child.wait().expect("waited for");
+            return None;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    Some(child.wait_with_output().expect("it has ended"))
+}
+
+/// What is left open is found in the first file, and the picture of it is then made of what was read: a pipe can be read once.
+#[cfg(unix)]
+#[test]
+fn the_first_file_is_read_once() {
+    let run = Run::new();
+    fs::create_dir_all(run.path("f")).expect("folder");
+    for i in 0..3 {
+        run.file(&format!("f/p{i}.csv"), moving(f64::from(i)));
+    }
+    for (name, more) in [
+        ("alone", &[][..]),
+        ("counted", &["--stats", "s.csv"]),
+        ("held", &["--memory", "2", "--stats", "h.csv"]),
+        ("between", &["--step", "1", "--fps", "2"]),
+    ] {
+        let (plain, piped) = (format!("{name}/#.png"), format!("piped-{name}/#.png"));
+        let args = |output| [&["sequence", "f/*.csv", "-o", output], SMALL, more].concat();
+        made(&run, &args(&plain));
+        let pipe = run.path("f/p0.csv");
+        fs::remove_file(&pipe).expect("removed");
+        assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+        let writer = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || fs::write(pipe, moving(0.0)).expect("whoever reads it reads all of it")
+        });
+        let output = ended(run.prepared(&args(&piped)), Duration::from_secs(100));
+        let output = output.unwrap_or_else(|| panic!("{name}: it is read again"));
+        assert!(output.status.success(), "{name}: {}", text(&output));
+        writer.join().expect("written");
+        fs::remove_file(&pipe).expect("removed");
+        run.file("f/p0.csv", moving(0.0));
+        let names = listing(&run.path(name));
+        assert!(names.len() >= 3 && names == listing(&run.path(&format!("piped-{name}"))), "{names:?}");
+        for picture in names {
+            let pixels = |folder: &str| run.pixels(&format!("{folder}/{picture}"));
+            assert!(pixels(name) == pixels(&format!("piped-{name}")), "{name}/{picture}");
+        }
+    }
+}
+
+/// A file of zeros that nobody stores, with more particles than lavapipe binds: preparing them would take longer than anybody waits.
+#[cfg(unix)]
+#[test]
+fn more_than_a_device_draws_is_refused_before_it_is_prepared() {
+    let run = Run::new();
+    let count = (128 << 20) / 16 + 1;
+    let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, 3), }}\n");
+    let path =
+        run.file("0.npy", [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes()].concat());
+    let file = fs::File::options().append(true).open(&path).expect("there");
+    file.set_len(10 + header.len() as u64 + 12 * count).expect("longer");
+    let refused = |args: &[&str], words: &[&str]| {
+        let all = [args, &["--device", "llvmpipe", "--size", "96x72"]].concat();
+        let output =
+            ended(run.prepared(&all), Duration::from_secs(60)).unwrap_or_else(|| panic!("{all:?}: it prepares"));
+        let said = text(&output);
+        assert!(output.status.code() == Some(1) && words.iter().all(|w| said.contains(w)), "{all:?}: {said}");
+        assert_eq!(listing(run.folder.path()), ["0.npy"]);
+    };
+    let most = ["0.npy", "8388609", "8388608 at most"];
+    refused(&["render", "0.npy", "-o", "a.png", "--radius", "0.1"], &most);
+    refused(&["sequence", "0.npy", "-o", "#.png", "--radius", "0.1"], &most);
+    refused(&[&["sequence", "0.npy", "-o", "#.png"], GIVEN].concat(), &most);
+    let on_device = ["0.npy", "8388609", "this device binds 134217728 at most"];
+    refused(&["render", "0.npy", "-o", "a.png", "--radius", "0.1", "--prepare", "gpu"], &on_device);
+}
+
 /// Files of at most 50 kB are like a disk that fills up.
 #[cfg(unix)]
 #[test]
 fn a_full_disk_ends_it() {
     let run = Run::new();
     frames(&run, 8);
-    let mut shell = std::process::Command::new("sh");
+    let mut shell = Command::new("sh");
     shell.args(["-c", "trap '' XFSZ; ulimit -f 100; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_meniscus"), "sequence"]);
     shell.args(["f/*.csv", "-o", "out/#.exr", "--size", "320x240"]).args(GIVEN);
     let output = shell.current_dir(run.folder.path()).env("TMPDIR", run.temporary.path()).output().expect("sh");

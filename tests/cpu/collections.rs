@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use meniscus::io::Budget;
-use meniscus::io::particles::{ReadError, describe, read, read_within, time_steps};
+use meniscus::io::particles::{ReadError, describe, read, read_within, time_step, time_steps};
 use std::{fs, path::Path};
 
 struct Folder(tempfile::TempDir);
@@ -100,17 +100,47 @@ fn one_time_is_joined_and_several_are_a_sequence() {
     let (file, contents) = describe(&one, &Budget::default()).expect("one time");
     assert_eq!(xs(&file.positions), [0.0, 1.0, 20.0, 21.0]);
     assert_eq!((contents.time, contents.files), (Some(1.5), 3));
-    let error = time_steps(&one, &Budget::default()).expect_err("two files").to_string();
-    assert!(error.contains("has 2 files"), "{error}");
+    let steps = time_steps(&one, &Budget::default()).expect("steps");
+    assert_eq!((steps.len(), steps[0].time, steps[0].files.len()), (1, 1.5, 2));
+    let joined = steps[0].describe(&Budget::default()).expect("both");
+    assert_eq!(joined, (file, contents));
     let all = folder.file("all.pvd", pvd(&[("0.5", "out/a_1.vtu"), ("0", "out/a_0.vtu"), ("1e0", "out/a_2.vtu")]));
     folder.refused(&all, &["3 time steps, from 0 to 1", "meniscus sequence"]);
     let steps = time_steps(&all, &Budget::default()).expect("steps");
     let names: Vec<_> =
-        steps.iter().map(|(time, file)| (*time, file.strip_prefix(folder.0.path()).expect("inside"))).collect();
+        steps.iter().map(|step| (step.time, step.files[0].strip_prefix(folder.0.path()).expect("inside"))).collect();
     assert_eq!(
         names,
         [(0.0, "out/a_0.vtu"), (0.5, "out/a_1.vtu"), (1.0, "out/a_2.vtu")].map(|(t, f)| (t, Path::new(f)))
     );
+}
+
+#[test]
+fn a_time_has_one_step() {
+    let folder = Folder::new();
+    for i in 0..3 {
+        folder.points(&format!("a{i}.vtu"), 10 * i, 1, "");
+    }
+    let all = [("0", "a1.vtu"), ("0.30000001", "a0.vtu"), ("0.9", "a2.vtu"), ("0.9", "a0.vtu")];
+    let path = folder.file("all.PVD", pvd(&all));
+    let at = |time| time_step(&path, time, &Budget::default());
+    let first = |time| xs(&at(time).expect("a step").read(&Budget::default()).expect("read").positions)[0];
+    for (time, x) in
+        [(0.0, 10.0), (-0.002, 10.0), (0.296, 10.0), (0.3, 0.0), (0.89, 0.0), (0.8999, 20.0), (0.902, 20.0)]
+    {
+        assert_eq!(first(time), x, "{time}");
+    }
+    for outside in [-0.004, 0.904, f64::NAN, f64::INFINITY] {
+        let error = at(outside).expect_err("outside");
+        assert!(matches!(error, ReadError::NoTime { first: 0.0, last: 0.9, .. }), "{error}");
+    }
+    // Of one time it is that time alone.
+    let path = folder.file("one.pvd", pvd(&[("1e3", "a1.vtu")]));
+    assert_eq!(time_step(&path, 1000.0005, &Budget::default()).expect("near").time, 1000.0);
+    assert!(time_step(&path, 1000.002, &Budget::default()).is_err());
+    let path = folder.file("none.pvd", "<VTKFile type=\"Collection\"><DataSet file=\"a0.vtu\"/></VTKFile>");
+    let message = time_step(&path, 0.0, &Budget::default()).expect_err("no times").to_string();
+    assert!(message.contains("none of its files has a time"), "{message}");
 }
 
 #[test]

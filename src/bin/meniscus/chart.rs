@@ -173,9 +173,7 @@ impl Args {
                 _ => self.options.base()?,
             };
             let mut picture = self.options.over(base, None)?;
-            if let Some(path) = path.filter(|p| !is_scene(p)) {
-                picture.particles = Some(path.into());
-            }
+            picture.draw(path.filter(|p| !is_scene(p)));
             picture.prepare.get_or_insert(Prepare::Cpu);
             picture.validate()?;
             let stem = path.or(self.options.scene.as_deref()).and_then(Path::file_stem);

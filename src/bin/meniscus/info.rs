@@ -2,7 +2,7 @@
 
 mod contents;
 
-use crate::terminal::line;
+use crate::{options::parse_time, terminal::line};
 use meniscus::{
     host::Instance,
     io::{Budget, particles::FORMATS},
@@ -16,6 +16,9 @@ pub struct Args {
     /// Describe them as a JSON list
     #[arg(long, requires = "files")]
     json: bool,
+    /// Of .pvd files the time step at this time, or the last before it
+    #[arg(long, value_name = "TIME", requires = "files", allow_negative_numbers = true, value_parser = parse_time)]
+    time: Option<f64>,
     /// Memory that reading a file may take
     #[arg(long, value_name = "BYTES", default_value_t, requires = "files")]
     max_memory: Budget,

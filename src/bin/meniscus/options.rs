@@ -80,8 +80,9 @@ pub struct Options {
     /// Scene file (TOML, as `render --save-scene` writes it); other options come before what it says
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
-    /// Of a scene file with keys: the moment, in seconds of the film; 0 if not given
-    #[arg(long, value_name = "SECONDS", requires = "scene", value_parser = parse_time)]
+    /// Of a .pvd: the time step at this time, or the last before it. Of a scene file with keys: the moment, in seconds of the film; 0
+    /// if not given
+    #[arg(long, value_name = "TIME", allow_negative_numbers = true, value_parser = parse_time)]
     pub time: Option<f64>,
     /// Of a camera file: the frame, also between two; the camera without frames, or the first, if not given
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = camera_file::parse_frame)]
@@ -118,9 +119,9 @@ fn parse_size(s: &str) -> Result<[u32; 2], String> {
     Ok([w.parse().map_err(|_| wrong())?, h.parse().map_err(|_| wrong())?])
 }
 
-fn parse_time(s: &str) -> Result<f64, String> {
-    let time = s.parse().ok().filter(|t: &f64| t.is_finite() && *t >= 0.0);
-    time.ok_or_else(|| format!("\"{}\" is not a number of seconds, 0 or more", terminal::plain(s)))
+pub fn parse_time(s: &str) -> Result<f64, String> {
+    let time = s.parse().ok().filter(|t: &f64| t.is_finite());
+    time.ok_or_else(|| format!("\"{}\" is no time: use a finite number", terminal::plain(s)))
 }
 
 fn parse_vector(s: &str) -> Result<DVec3, String> {
@@ -172,6 +173,7 @@ impl Options {
         cameras: &mut Cameras,
     ) -> Result<Picture, Box<dyn Error>> {
         self.replacing.apply(&mut picture);
+        (picture.time, picture.time_of_film) = (self.time, self.scene.is_some());
         picture.size_given |= self.replacing.size.is_some();
         if self.camera_frame.is_some() && picture.camera.file.is_none() && picture.camera.upright.is_none() {
             return Err(CameraFileError::NoFile.into());

@@ -4,17 +4,19 @@ use crate::{
     camera::{self, View},
     choices,
     compositing::{Background, Channels},
-    scene::{Prepare, Scene},
+    scene::{self, Prepare, Scene},
 };
 use glam::{DVec3, Vec3};
 use meniscus::{
     Camera, Equirect, Error, Parameters, Particles, Settings,
+    host::DeviceInfo,
     io::{
         Budget,
         images::{self, ImageError},
-        particles::ParticleFile,
+        particles::{ParticleFile, ReadError, TimeStep, has_steps, time_step},
     },
-    prepare,
+    prepare::{self, DevicePositions},
+    renderer::Amount,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -29,6 +31,8 @@ use std::{
 pub struct Picture {
     /// Particle file; the embedded dam break if there is none.
     pub particles: Option<PathBuf>,
+    /// Of particles with time steps (.pvd) the one at this time, or the last before it.
+    pub particles_time: Option<f64>,
     /// In world units; the file's, or estimated, if there is none.
     pub radius: Option<f64>,
     pub drop_invalid: bool,
@@ -59,6 +63,12 @@ pub struct Picture {
     /// Whether the size is meant, or is to be a camera file's, if there is one.
     #[serde(skip)]
     pub size_given: bool,
+    /// The time that is asked for, of whatever file.
+    #[serde(skip)]
+    pub time: Option<f64>,
+    /// Whether that is a second of a film in the first place, so that files without time steps are right, too.
+    #[serde(skip)]
+    pub time_of_film: bool,
 }
 
 /// What is infinitely far away.
@@ -78,6 +88,7 @@ impl Default for Picture {
     fn default() -> Picture {
         Picture {
             particles: None,
+            particles_time: None,
             radius: None,
             drop_invalid: false,
             prepare: None,
@@ -93,6 +104,8 @@ impl Default for Picture {
             absorption_given: false,
             keep_class_below: None,
             size_given: false,
+            time: None,
+            time_of_film: false,
         }
     }
 }
@@ -132,6 +145,9 @@ impl Picture {
             let (least, most) = (SUPERSAMPLE.start(), SUPERSAMPLE.end());
             return Err(wrong("supersample", self.supersample, format!("use {least} to {most}")));
         }
+        if let Some(time) = self.particles_time.filter(|time| !time.is_finite()) {
+            return Err(wrong("particles_time", time, "use a finite number"));
+        }
         if self.size.contains(&0) {
             return Err(wrong("size", format!("{}x{}", self.size[0], self.size[1]), "use 1 or more pixels each way"));
         }
@@ -159,21 +175,70 @@ impl Picture {
 
     /// Reads a particle file, or what is embedded, and prepares it.
     pub fn load(&self, file: Option<&Path>, prepare: Prepare) -> Result<Scene, Box<dyn std::error::Error>> {
-        self.prepared(Scene::read(self, file)?, file, prepare)
+        self.load_for(None, file, prepare)
     }
 
-    /// Prepares what [`Scene::read`] read of a file.
+    /// [`Picture::load`] for a device: what it cannot draw is refused before it is prepared.
+    pub fn load_for(
+        &self,
+        device: Option<&DeviceInfo>,
+        file: Option<&Path>,
+        prepare: Prepare,
+    ) -> Result<Scene, Box<dyn std::error::Error>> {
+        let step = self.step(file)?;
+        let mut scene = self.prepared(device, Scene::read(self, file, step.as_ref())?, file, prepare)?;
+        scene.time = step.map(|step| step.time);
+        Ok(scene)
+    }
+
+    /// The time step of a file that is asked for.
+    fn step(&self, file: Option<&Path>) -> Result<Option<TimeStep>, ReadError> {
+        let steps = file.is_some_and(has_steps);
+        let own = self.particles_time.filter(|_| file == self.particles.as_deref());
+        let time = self.time.filter(|_| steps || !self.time_of_film).or(own);
+        time.map(|time| time_step(scene::name(file), time, &self.max_memory)).transpose()
+    }
+
+    /// Another file in the place of its own, if there is one.
+    pub fn draw(&mut self, file: Option<&Path>) {
+        if let Some(file) = file {
+            (self.particles, self.particles_time) = (Some(file.into()), None);
+        }
+    }
+
+    /// Prepares what [`Scene::read`] read of a file, unless the device cannot draw it.
     pub fn prepared(
         &self,
+        device: Option<&DeviceInfo>,
         read: (ParticleFile, usize),
         file: Option<&Path>,
         prepare: Prepare,
     ) -> Result<Scene, Box<dyn std::error::Error>> {
+        let fits = device.map_or(Ok(()), |device| self.check_amount(device, read.0.positions.len(), prepare));
         // Readers name their file; what comes after them does not know it.
-        Scene::of(self, read, file, prepare).map_err(|e| match file {
+        fits.and_then(|()| Scene::of(self, read, file, prepare)).map_err(|e| match file {
             Some(file) => format!("{}: {e}", file.display()).into(),
             None => e,
         })
+    }
+
+    /// Refuses more particles than a device can draw, of whatever classes they will be.
+    fn check_amount(
+        &self,
+        device: &DeviceInfo,
+        count: usize,
+        prepare: Prepare,
+    ) -> Result<(), Box<dyn std::error::Error>> {
+        let (size, settings) = (self.rendered_size()?, choices::enlarge(&self.settings, self.supersample)?);
+        if prepare.on_device() {
+            let options = prepare::Options { search: prepare.search(self.preparation.search), ..Default::default() };
+            let count = u32::try_from(count).unwrap_or(u32::MAX);
+            let positions = DevicePositions::packed(Default::default(), count, 1.0).options(options);
+            return Ok(device.check_amount(size, Amount::OnDevice(&positions), &settings)?);
+        }
+        // What is of one class alone takes least.
+        let of = |splash, body| device.check_amount(size, Amount::Prepared { splash, body }, &settings);
+        Ok(of(0, count).or_else(|e| of(count, 0).map_err(|_| e))?)
     }
 
     /// The camera, its eye relative to the scene's origin, and the view that it is.
@@ -206,7 +271,8 @@ impl Picture {
     pub fn settled(self, scene: &Scene) -> Result<Picture, Error> {
         let (_, _, camera) = self.camera(scene)?;
         let (radius, settings) = (shortest(scene.particles.radius), self.settings(&scene.particles));
-        Ok(Picture { radius: Some(radius), camera, settings, absorption_given: true, ..self })
+        let particles_time = scene.time;
+        Ok(Picture { radius: Some(radius), particles_time, camera, settings, absorption_given: true, ..self })
     }
 
     /// Settings of the frame that is rendered.

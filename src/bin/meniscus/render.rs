@@ -53,7 +53,7 @@ impl Args {
     fn picture(&self) -> Result<Picture, Box<dyn std::error::Error>> {
         let mut picture = self.options.over(self.options.base()?, None)?;
         self.compositing.apply(&mut picture);
-        picture.particles = self.file.clone().or(picture.particles);
+        picture.draw(self.file.as_deref());
         picture.prepare.get_or_insert(Prepare::Cpu);
         Ok(picture)
     }
@@ -109,8 +109,13 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn std::error::Error>> {
     let environment = picture.environment()?;
     let instance = Instance::new(args.validate)?;
     let device = instance.pick(args.options.device.as_deref())?;
-    let scene = picture.load(picture.particles.as_deref(), picture.preparer())?;
+    let scene = picture.load_for(Some(&device), picture.particles.as_deref(), picture.preparer())?;
     announce(&scene, &device.name, &device.driver);
+    if let Some(time) = scene.time {
+        let asked = picture.time.or(picture.particles_time).filter(|asked| *asked != time);
+        let of = asked.map_or(String::new(), |asked| format!(", the one for {asked}"));
+        terminal::progress(format!("time step: {time}{of}"));
+    }
     let mut job = plan(args, picture, &scene)?;
     let on_device = on(&device);
     let drawn = (|| {

@@ -8,7 +8,7 @@ use meniscus::{
     Camera, Class, Ellipsoid, EyeInside, FrameInput, Particles, Point, Renderer, Settings,
     ash::vk::ImageView,
     host::{Session, Upload},
-    io::particles::{Invalid, ParticleFile, ReadError, check_finite, read_bytes, read_within},
+    io::particles::{Invalid, ParticleFile, ReadError, TimeStep, check_finite, read_bytes, read_within},
     prepare::{self, DensityField, DevicePositions, Input, Options, PrepareError, Report, Search},
     shader,
 };
@@ -31,6 +31,8 @@ pub struct Scene {
     /// Everything is drawn relative to this point of the file's coordinates, which keeps single precision precise.
     pub origin: DVec3,
     pub radius_source: &'static str,
+    /// When it is, where it is a time step of a collection.
+    pub time: Option<f64>,
     pub dropped: usize,
     pub prepare_ms: f64,
     /// Centres, relative to the origin.
@@ -71,13 +73,18 @@ impl Prepare {
 }
 
 impl Scene {
-    /// Reads a particle file, or what is embedded; also says how many particles were left out of it.
-    pub fn read(picture: &Picture, source: Option<&Path>) -> Result<(ParticleFile, usize), ReadError> {
+    /// Reads a particle file, a time step that it has, or what is embedded; also says how many particles were left out of it.
+    pub fn read(
+        picture: &Picture,
+        source: Option<&Path>,
+        step: Option<&TimeStep>,
+    ) -> Result<(ParticleFile, usize), ReadError> {
         let bar = spinner("reading particles");
         let path = name(source);
-        let mut file = match source {
-            Some(path) => read_within(path, &picture.max_memory)?,
-            None => read_bytes(path, EMBEDDED, &picture.max_memory)?,
+        let mut file = match (source, step) {
+            (_, Some(step)) => step.read(&picture.max_memory)?,
+            (Some(path), None) => read_within(path, &picture.max_memory)?,
+            (None, None) => read_bytes(path, EMBEDDED, &picture.max_memory)?,
         };
         let policy = if picture.drop_invalid { Invalid::Drop } else { Invalid::Reject };
         let dropped = check_finite(&mut file, policy, path)?;
@@ -148,6 +155,7 @@ impl Scene {
             report,
             origin,
             radius_source,
+            time: None,
             dropped,
             prepare_ms,
             positions,
@@ -169,6 +177,7 @@ impl Scene {
             report,
             origin: DVec3::ZERO,
             radius_source: "made",
+            time: None,
             dropped: 0,
             prepare_ms,
             positions,
@@ -243,7 +252,7 @@ impl Scene {
 }
 
 /// What messages call the source of particles.
-fn name(source: Option<&Path>) -> &Path {
+pub fn name(source: Option<&Path>) -> &Path {
     source.unwrap_or(Path::new("embedded dam_break.bgeo"))
 }
 

@@ -29,7 +29,7 @@ use meniscus::{
     host::{Gpu, Instance, Session},
     inspect,
 };
-use plan::{Exposure, Plan, Shot};
+use plan::{Exposure, First, Outline, Plan, Shot};
 use std::{
     error::Error,
     path::PathBuf,
@@ -43,7 +43,8 @@ use writer::{Message, Writer};
 #[derive(clap::Args)]
 pub struct Args {
     /// Particle files, one a frame: names, or patterns such as 'frames/*.vtk' in quotation marks; the scene file's `particles`
-    /// if none is given. Their order is that of the number in which their names differ
+    /// if none is given. Their order is that of the number in which their names differ; time steps of a .pvd are numbered from 0 in
+    /// order of time
     pub inputs: Vec<PathBuf>,
     /// Numbered pictures, .png (sRGB, 8 bits) or .exr (linear, float), `#` for each digit: out/####.png. The numbers are the
     /// inputs'. Or a film: .mp4, .mkv or .webm (by ffmpeg, which has to be installed), .gif, or .png without `#` (animated). May be
@@ -67,10 +68,11 @@ pub struct Args {
     /// Pictures a second, of films and of the time that a scene file's keys count in
     #[arg(long, value_name = "RATE", default_value_t = 25.0, value_parser = rate)]
     pub fps: f64,
-    /// Simulated seconds from one frame to the next. Pictures are then taken at --fps, between frames too, along paths that the
-    /// particles' velocities give, and are numbered from 0; without, there is one of each frame
-    #[arg(long, value_name = "SECONDS", value_parser = above_zero)]
-    pub step: Option<f64>,
+    /// Simulated seconds from one frame to the next, or `own`: by the times that a .pvd gives its time steps, in seconds. Pictures are
+    /// then taken at --fps, between frames too, along paths that the particles' velocities give, and are numbered from 0; without, there
+    /// is one of each frame
+    #[arg(long, value_name = "SECONDS|own")]
+    pub step: Option<between::Step>,
     /// With --step: simulated seconds in a second of the film; 1 if not given, less is slow motion
     #[arg(long, value_name = "N", requires = "step", value_parser = above_zero)]
     pub speed: Option<f64>,
@@ -110,9 +112,17 @@ struct LeftOut {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
-    let plan = Plan::new(args)?;
+    let outline = Outline::new(args)?;
+    // What a device cannot draw is refused before it is prepared; that there is none is said where one is needed.
+    let instance = Instance::new(args.validate);
+    let found = instance.as_ref().ok().and_then(|instance| instance.pick(args.options.device.as_deref()).ok());
+    let mut plan = outline.plan(found.as_ref())?;
+    let first = plan.first.take();
     for (last, next) in plan.frames.gaps().into_iter().take(5) {
         terminal::complain(format!("note: no frames between {last} and {next}"));
+    }
+    if let Some(note) = between::note(args.step, &plan.frames) {
+        terminal::complain(note);
     }
     let all = plan.shots.len();
     let to_do = plan.shots.iter().filter(|s| !s.kept).count();
@@ -122,7 +132,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
         } else if plan.films.is_empty() && !plan.stats.as_deref().is_some_and(table::has_parts) {
             terminal::progress(format!("nothing to do: all {all} pictures are there, {}", plan.names()));
         } else {
-            make(args, &plan, None)?;
+            make(args, &plan, None, None)?;
             terminal::progress(format!("all {all} pictures are there: {}", plan.names()));
         }
         return Ok(ExitCode::SUCCESS);
@@ -132,7 +142,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let views = plan.shots.iter().flat_map(|s| &s.exposures).map(|e| &e.picture);
     let narrowest = views.min_by(|a, b| a.camera.fov_y.total_cmp(&b.camera.fov_y)).unwrap_or(picture);
     let environment = narrowest.environment()?;
-    let instance = Instance::new(args.validate)?;
+    let instance = instance?;
     let device = instance.pick(args.options.device.as_deref())?;
     terminal::progress(format!("device: {} ({})", device.name, device.driver));
     let there = if to_do < all { format!(", {} of which are there already", all - to_do) } else { String::new() };
@@ -142,7 +152,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
     let failed = (|| {
         let gpu = Gpu::new(&instance, device)?;
         let mut session = Session::new(&gpu, picture.rendered_size()?, &environment)?;
-        let done = make(args, &plan, Some(&mut session));
+        let done = make(args, &plan, Some(&mut session), first);
         session.end();
         done
     })()
@@ -158,12 +168,18 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
 }
 
 /// Makes what is not there; says how many pictures could not be made.
-fn make(args: &Args, plan: &Plan, session: Option<&mut Session>) -> Result<usize, Box<dyn Error>> {
+fn make(
+    args: &Args,
+    plan: &Plan,
+    session: Option<&mut Session>,
+    first: Option<First>,
+) -> Result<usize, Box<dyn Error>> {
     scene::one_bar();
     let bar = writer::bar(plan.shots.iter().filter(|s| !s.kept).count());
     let writer = Writer::new(args, plan, &bar).map_err(|e| -> Box<dyn Error> { e })?;
+    let device = session.as_deref().map(|session| &session.gpu.info);
     let (drawn, written) = std::thread::scope(|scope| {
-        let ready = ahead::start(scope, plan);
+        let ready = ahead::start(scope, plan, first, device);
         let (to_writer, messages) = std::sync::mpsc::sync_channel(1);
         let writing = scope.spawn(move || writer.run(&messages));
         let drawn = draw_all(args, plan, session, &ready, &to_writer, &bar);
@@ -295,9 +311,9 @@ fn check(args: &Args, pictures: &[PathBuf], inputs: &[outputs::Named]) -> Result
 
 /// How many pictures there are to make; an error if there are films alone, whose parts are nothing.
 pub fn count(args: &Args) -> Result<usize, Box<dyn Error>> {
-    let plan = Plan::new(args)?;
+    let outline = Outline::new(args)?;
     if args.output.iter().all(|p| Kind::of(p).is_some()) {
         return Err(plan::NO_PICTURES.into());
     }
-    Ok(plan.shots.len())
+    Ok(outline.count())
 }

@@ -210,7 +210,7 @@ impl Args {
             return Err("the truth is traced on the CPU: leave out --device".into());
         }
         let mut picture = self.options.over(self.options.base()?, None)?;
-        picture.particles = self.file.clone().or(picture.particles);
+        picture.draw(self.file.as_deref());
         picture.prepare = Some(Prepare::Cpu);
         picture.validate()?;
         Ok(picture)

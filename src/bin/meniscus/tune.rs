@@ -168,7 +168,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Box<dyn Error>> {
 impl Args {
     fn picture(&self) -> Result<Picture, Box<dyn Error>> {
         let mut picture = self.options.over(self.options.base()?, None)?;
-        picture.particles = self.file.clone().or(picture.particles);
+        picture.draw(self.file.as_deref());
         picture.prepare.get_or_insert(Prepare::Cpu);
         picture.validate()?;
         Ok(picture)

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use quick_xml::Reader;
 use quick_xml::events::Event;
 
-use super::contents::Notes;
+use super::contents::{Contents, Notes};
 use super::source::Source;
 use super::vtk_xml::{attribute, xml};
 use super::{At, ParticleFile, ReadError, guarded, read_noting};
@@ -97,16 +97,28 @@ pub(super) fn read(
     above: &[PathBuf],
 ) -> Result<ParticleFile, ReadError> {
     let members = guarded(path, bytes, budget, notes, members)?;
-    let wrong = |detail: String, remedy| wrong(path, detail, remedy);
     let steps = steps(&members);
     if let [(first, _), .., (last, _)] = steps[..] {
         let (count, first, last) = (steps.len(), first, last);
         return Err(ReadError::Steps { path: path.into(), count, first, last });
     }
     notes.note(|notes| notes.time = steps.first().map(|(time, _)| *time));
+    let files: Vec<PathBuf> = members.into_iter().map(|member| member.file).collect();
+    joined(path, &files, budget, notes, above)
+}
+
+/// Reads files that a collection names, and joins them.
+fn joined(
+    path: &Path,
+    members: &[PathBuf],
+    budget: &Budget,
+    notes: &Notes,
+    above: &[PathBuf],
+) -> Result<ParticleFile, ReadError> {
+    let wrong = |detail: String, remedy| wrong(path, detail, remedy);
     let same = |file: &Path| file.canonicalize().unwrap_or_else(|_| file.into());
     let above = [above, &[same(path)]].concat();
-    let files: Vec<PathBuf> = members.iter().map(|member| same(&member.file)).collect();
+    let files: Vec<PathBuf> = members.iter().map(|member| same(member)).collect();
     let mut sorted: Vec<_> = files.iter().collect();
     sorted.sort();
     if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -123,12 +135,12 @@ pub(super) fn read(
     let sizes = files.iter().filter_map(|file| file.metadata().ok()).map(|metadata| metadata.len());
     let ledger = Ledger::of_parts(*budget, sizes.fold(0, u64::saturating_add));
     let mut all: Option<ParticleFile> = None;
-    for member in &members {
+    for member in members {
         let inner = Notes::like(notes);
-        let part = read_noting(&member.file, budget, &inner, &above)
+        let part = read_noting(member, budget, &inner, &above)
             .map_err(|source| ReadError::Member { path: path.into(), source: Box::new(source) })?;
         notes.join(inner);
-        let whole = Joined { path, member: &member.file, ledger: &ledger };
+        let whole = Joined { path, member, ledger: &ledger };
         all = Some(match all {
             None => whole.first(part)?,
             Some(all) => whole.join(all, part)?,
@@ -187,19 +199,78 @@ impl Joined<'_> {
     }
 }
 
-/// The files of a collection's time steps, each with its time, where it has several; for a sequence of pictures.
+/// A time of a collection (`.pvd`), and the files that are there at it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimeStep {
+    /// The file that says so.
+    pub collection: PathBuf,
+    /// In the collection's own units, which are mostly simulated seconds.
+    pub time: f64,
+    /// At least one; several are pieces of one state.
+    pub files: Vec<PathBuf>,
+}
+
+impl TimeStep {
+    /// Reads its files, and joins them.
+    ///
+    /// # Errors
+    /// As [`super::read`].
+    pub fn read(&self, budget: &Budget) -> Result<ParticleFile, ReadError> {
+        joined(&self.collection, &self.files, budget, &Notes::default(), &[])
+    }
+
+    /// [`TimeStep::read`], and what the files say of themselves.
+    ///
+    /// # Errors
+    /// As [`super::read`].
+    pub fn describe(&self, budget: &Budget) -> Result<(ParticleFile, Contents), ReadError> {
+        let notes = Notes::wanted();
+        notes.note(|notes| (notes.format, notes.time) = ("VTK XML Collection".into(), Some(self.time)));
+        let file = joined(&self.collection, &self.files, budget, &notes, &[])?;
+        Ok((file, notes.finish()))
+    }
+}
+
+/// The time steps of a collection in order of their times, however its files are called.
 ///
 /// # Errors
-/// As [`super::read`], of the collection alone; [`ReadError::Malformed`] if a time step has several files.
-pub fn time_steps(path: &Path, budget: &Budget) -> Result<Vec<(f64, PathBuf)>, ReadError> {
+/// As [`super::read`], of the collection alone.
+pub fn time_steps(path: &Path, budget: &Budget) -> Result<Vec<TimeStep>, ReadError> {
     let bytes = super::bytes(path, budget)?;
     let members = guarded(path, &bytes, budget, &Notes::default(), members)?;
-    let one = |(time, files): (f64, Vec<&Path>)| match files[..] {
-        [file] => Ok((time, file.to_owned())),
-        _ => {
-            let detail = format!("the time {time} has {} files", files.len());
-            Err(wrong(path, detail, "write a .pvtu or .vtm for each time, and name those"))
-        }
+    let own = |(time, files): (f64, Vec<&Path>)| TimeStep {
+        collection: path.into(),
+        time,
+        files: files.into_iter().map(Path::to_owned).collect(),
     };
-    steps(&members).into_iter().map(one).collect()
+    Ok(steps(&members).into_iter().map(own).collect())
+}
+
+/// The time step of a collection at a time, or the last before it.
+///
+/// # Errors
+/// As [`time_steps`]; [`ReadError::NoTime`] for a time before the first or after the last; [`ReadError::Malformed`] for a file
+/// without times.
+pub fn time_step(path: &Path, time: f64, budget: &Budget) -> Result<TimeStep, ReadError> {
+    let without = |detail: &str| wrong(path, detail.into(), "name it without a time");
+    if !has_steps(path) {
+        return Err(without("is no collection of time steps (.pvd), of which a time takes one"));
+    }
+    let mut steps = time_steps(path, budget)?;
+    let (Some(first), Some(last)) = (steps.first().map(|s| s.time), steps.last().map(|s| s.time)) else {
+        return Err(without("none of its files has a time"));
+    };
+    // A time is often written with fewer digits than somebody has of it, or with more: so much of a step is none.
+    let shortest = steps.windows(2).map(|two| two[1].time - two[0].time).reduce(f64::min);
+    let near = shortest.map_or(1e-6 * first.abs(), |shortest| 0.01 * shortest);
+    if !(first - near..=last + near).contains(&time) {
+        return Err(ReadError::NoTime { path: path.into(), time, first, last });
+    }
+    let before = steps.partition_point(|step| step.time <= time + near);
+    Ok(steps.swap_remove(before.saturating_sub(1)))
+}
+
+/// Whether it is a collection whose files have times, by its name.
+pub fn has_steps(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pvd"))
 }

@@ -8,7 +8,7 @@ use crate::{
 use glam::DVec3;
 use meniscus::{
     io::{
-        particles::{Contents, Invalid, ParticleFile, ReadError, check_finite, describe},
+        particles::{Contents, Invalid, ParticleFile, ReadError, check_finite, describe, time_step},
         quote,
     },
     prepare,
@@ -72,7 +72,10 @@ struct Array {
 }
 
 fn of(path: &Path, args: &Args) -> Result<Found, ReadError> {
-    let (mut file, contents) = describe(path, &args.max_memory)?;
+    let (mut file, contents) = match args.time {
+        Some(time) => time_step(path, time, &args.max_memory)?.describe(&args.max_memory)?,
+        None => describe(path, &args.max_memory)?,
+    };
     let not_finite = check_finite(&mut file, Invalid::Drop, path)?;
     let positions = std::mem::take(&mut file.positions);
     let count = positions.len();

@@ -4,10 +4,13 @@ use super::{
     between::{Moment, between},
     memory::Memory,
     ms_since,
-    plan::{Exposure, Plan},
+    plan::{Exposure, First, Plan},
 };
 use crate::{picture::Picture, scene::Scene};
-use meniscus::io::particles::{ParticleFile, ReadError};
+use meniscus::{
+    host::DeviceInfo,
+    io::particles::{ParticleFile, ReadError},
+};
 use std::{
     borrow::Cow,
     error::Error,
@@ -28,13 +31,21 @@ pub struct Ready {
 
 /// Starts the thread: it gives every exposure of the pictures that are not there, in order; of a picture whose frame cannot be
 /// had it gives why, and goes on with the next picture. One waits to be taken, and no more is made until then.
-pub fn start<'s>(scope: &'s Scope<'s, '_>, plan: &'s Plan) -> Receiver<Result<Ready, String>> {
+pub fn start<'s>(
+    scope: &'s Scope<'s, '_>,
+    plan: &'s Plan,
+    mut first: Option<First>,
+    device: Option<&'s DeviceInfo>,
+) -> Receiver<Result<Ready, String>> {
     let (give, ready) = sync_channel(0);
     scope.spawn(move || {
-        let (mut read, mut memory) = (Read::default(), Memory::default());
+        let known = first.as_mut().and_then(|first| first.read.take());
+        let (mut read, mut memory) = (Read(known.map(|known| (0, known)).into_iter().collect()), Memory::default());
         for shot in plan.shots.iter().filter(|s| !s.kept) {
             for exposure in &shot.exposures {
-                let next = load(plan, exposure, &mut read, &mut memory).map_err(|e| e.to_string());
+                // The very first or none.
+                let first = first.take().filter(|first| first.is(exposure));
+                let next = load(plan, exposure, (&mut read, &mut memory), first, device).map_err(|e| e.to_string());
                 let failed = next.is_err();
                 if give.send(next).is_err() {
                     return; // nobody draws any more
@@ -59,7 +70,7 @@ impl Read {
             Some(at) => at,
             None => {
                 self.0.retain(|(f, _)| *f + 1 == frame);
-                self.0.push((frame, Scene::read(picture, Some(&plan.frames.all()[frame].file))?));
+                self.0.push((frame, plan.frames.all()[frame].read(picture)?));
                 self.0.len() - 1
             }
         };
@@ -75,7 +86,7 @@ impl Read {
     ) -> Result<Cow<'_, (ParticleFile, usize)>, ReadError> {
         match self.0.iter().find(|(f, _)| *f == frame) {
             Some((_, found)) => Ok(Cow::Borrowed(found)),
-            None => Scene::read(picture, Some(&plan.frames.all()[frame].file)).map(Cow::Owned),
+            None => plan.frames.all()[frame].read(picture).map(Cow::Owned),
         }
     }
 
@@ -88,7 +99,9 @@ impl Read {
     ) -> Result<(ParticleFile, usize), Box<dyn Error>> {
         let frames = plan.frames.all();
         if !plan.between {
-            return Ok(Scene::read(picture, Some(&frames[moment.frame].file))?);
+            let own = self.0.iter().position(|(frame, _)| *frame == moment.frame).map(|at| self.0.swap_remove(at).1);
+            self.0.retain(|(frame, _)| frame + plan.looks_back() >= moment.frame);
+            return own.map_or_else(|| Ok(frames[moment.frame].read(picture)?), Ok);
         }
         if moment.toward == 0.0 {
             return Ok(self.frame(plan, picture, moment.frame)?.clone());
@@ -101,15 +114,33 @@ impl Read {
     }
 }
 
-fn load(plan: &Plan, exposure: &Exposure, read: &mut Read, memory: &mut Memory) -> Result<Ready, Box<dyn Error>> {
+fn load(
+    plan: &Plan,
+    exposure: &Exposure,
+    (read, memory): (&mut Read, &mut Memory),
+    first: Option<First>,
+    device: Option<&DeviceInfo>,
+) -> Result<Ready, Box<dyn Error>> {
+    let first = match first {
+        Some(First { scene: Some(scene), read_ms, prepare_ms, .. }) if plan.looks_back() == 0 => {
+            return Ok(Ready { scene, read_ms, prepare_ms, class_changes: None });
+        }
+        other => other,
+    };
     let picture = &exposure.picture;
     let begin = Instant::now();
     let mut particles = read.moment(plan, picture, &exposure.moment)?;
-    let read_ms = ms_since(begin);
+    let read_ms = ms_since(begin) + first.as_ref().map_or(0.0, |first| first.read_ms);
     let begin = Instant::now();
     let file = plan.frames.all()[exposure.moment.frame].file.as_path();
     let held = memory.held(plan, exposure, &particles, read).map_err(|e| format!("{}: {e}", file.display()))?;
-    particles.0.classes = held.classes.or(particles.0.classes.take());
-    let scene = picture.prepared(particles, Some(file), picture.preparer())?;
-    Ok(Ready { scene, read_ms, prepare_ms: ms_since(begin), class_changes: held.changes })
+    let before = first.as_ref().map_or(0.0, |first| first.prepare_ms);
+    let scene = match first.and_then(|first| first.scene) {
+        Some(scene) => scene,
+        None => {
+            particles.0.classes = held.classes.or(particles.0.classes.take());
+            picture.prepared(device, particles, Some(file), picture.preparer())?
+        }
+    };
+    Ok(Ready { scene, read_ms, prepare_ms: ms_since(begin) + before, class_changes: held.changes })
 }

@@ -1,14 +1,16 @@
 //! The frames of a simulation: which files they are, what numbers they have, which of them are wanted, and what pictures of them
 //! are called.
 
+use crate::{picture::Picture, scene::Scene};
 use meniscus::io::{
     Budget,
-    particles::{ReadError, time_steps},
+    particles::{ParticleFile, ReadError, TimeStep, has_steps, time_steps},
 };
 use std::{
     collections::BTreeMap,
     fmt,
     path::{Path, PathBuf},
+    slice,
     str::FromStr,
 };
 
@@ -31,28 +33,39 @@ pub enum FramesError {
     Unlike(PathBuf, PathBuf),
     #[error("{} and {}: both would be picture {number}; name one of them", first.display(), second.display())]
     Twice { number: u64, first: PathBuf, second: PathBuf },
+    #[error("{} has time steps of its own, and {} is none of them; name one of them", collection.display(), file.display())]
+    Mixed { collection: PathBuf, file: PathBuf },
+    #[error("{} and {}: both have a time step at {time}; name one of them", first.display(), second.display())]
+    SameTime { time: f64, first: PathBuf, second: PathBuf },
     #[error("--frames {selection}: none of the numbers is among them: there are {first} to {last}")]
     Unselected { selection: Selection, first: u64, last: u64 },
     #[error("{}: name numbered pictures, `#` for each digit, such as out/####.png", .0.display())]
     NoNumber(PathBuf),
 }
 
-/// Files of a ParaView collection's time steps.
-fn named(file: &Path) -> Result<Vec<(f64, PathBuf)>, ReadError> {
-    match file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pvd")) {
-        true => time_steps(file, &Budget::default()),
-        false => Ok(Vec::new()),
-    }
-}
-
-/// One file of a simulation.
+/// One state of a simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     pub number: u64,
+    /// What it is called: its file, or the collection that has several for it.
     pub file: PathBuf,
+    /// Of a collection with several.
+    step: Option<TimeStep>,
 }
 
-/// All files, by their numbers; at least one.
+impl Frame {
+    /// Reads its particles; also says how many were left out.
+    pub fn read(&self, picture: &Picture) -> Result<(ParticleFile, usize), ReadError> {
+        Scene::read(picture, Some(&self.file), self.step.as_ref())
+    }
+
+    /// All that is read of it.
+    pub fn files(&self) -> &[PathBuf] {
+        self.step.as_ref().map_or(slice::from_ref(&self.file), |step| &step.files)
+    }
+}
+
+/// All of them, by their numbers; at least one.
 #[derive(Debug)]
 pub struct Frames {
     all: Vec<Frame>,
@@ -66,10 +79,7 @@ impl Frames {
         let mut files = Vec::new();
         for pattern in patterns {
             if pattern.exists() {
-                match named(pattern)? {
-                    steps if steps.len() > 1 => files.extend(steps.into_iter().map(|(_, file)| file)),
-                    _ => files.push(pattern.clone()),
-                }
+                files.push(pattern.clone());
                 continue;
             }
             let wrong = |message: String| FramesError::Pattern { pattern: pattern.clone(), message };
@@ -82,13 +92,41 @@ impl Frames {
                 return Err(FramesError::None(pattern.clone()));
             }
         }
-        Frames::of(files)
+        files.sort();
+        files.dedup();
+        let (mut steps, mut single) = (Vec::new(), Vec::new());
+        for file in files {
+            match if has_steps(&file) { time_steps(&file, &Budget::default())? } else { Vec::new() } {
+                several if several.len() > 1 => steps.extend(several),
+                _ => single.push(file),
+            }
+        }
+        match (steps.first(), single.first()) {
+            (None, _) => Frames::of(single),
+            (Some(_), None) => Frames::in_time(steps),
+            (Some(step), Some(file)) => {
+                Err(FramesError::Mixed { collection: step.collection.clone(), file: file.clone() })
+            }
+        }
+    }
+
+    /// Numbers time steps from 0, as ParaView does: their files' names say nothing of time.
+    fn in_time(mut steps: Vec<TimeStep>) -> Result<Frames, FramesError> {
+        steps.sort_by(|a, b| a.time.total_cmp(&b.time));
+        if let Some([a, b]) = steps.windows(2).find(|two| two[0].time == two[1].time) {
+            let (first, second) = (a.collection.clone(), b.collection.clone());
+            return Err(FramesError::SameTime { time: a.time, first, second });
+        }
+        let frame = |(number, step): (u64, TimeStep)| {
+            let file = if let [file] = &step.files[..] { file } else { &step.collection };
+            Frame { number, file: file.clone(), step: Some(step) }
+        };
+        Ok(Frames { all: (0..).zip(steps).map(frame).collect(), stride: 1 })
     }
 
     /// Numbers files by what their names differ in.
     fn of(mut files: Vec<PathBuf>) -> Result<Frames, FramesError> {
         files.sort();
-        files.dedup();
         let names: Vec<_> = files.iter().map(|f| parts(f)).collect();
         let Some(first) = names.first() else { return Err(FramesError::Nothing) };
         if let Some(i) = names.iter().position(|n| n.text != first.text) {
@@ -116,7 +154,7 @@ impl Frames {
                 return Err(FramesError::Twice { number, first, second: file });
             }
         }
-        let all: Vec<_> = all.into_iter().map(|(number, file)| Frame { number, file }).collect();
+        let all: Vec<_> = all.into_iter().map(|(number, file)| Frame { number, file, step: None }).collect();
         let stride = all.windows(2).map(|w| w[1].number - w[0].number).min().unwrap_or(1);
         Ok(Frames { all, stride })
     }
@@ -134,6 +172,13 @@ impl Frames {
     /// When a frame comes, counted in frames from the first; where numbers are missing there is time between.
     pub fn place(&self, index: usize) -> f64 {
         (self.all[index].number - self.all[0].number) as f64 / self.stride as f64
+    }
+
+    /// Their own times, if they have any, counted from the first.
+    pub fn times(&self) -> Option<Vec<f64>> {
+        let time = |frame: &Frame| frame.step.as_ref().map(|step| step.time);
+        let first = self.all.first().and_then(time)?;
+        self.all.iter().map(|frame| Some(time(frame)? - first)).collect()
     }
 
     /// Where numbers are missing: the last before and the first after.
@@ -272,11 +317,28 @@ mod tests {
         let set = |time, name| format!("<DataSet timestep=\"{time}\" file=\"{name}\"/>");
         let write =
             |name, sets: String| std::fs::write(at(name), format!("<VTKFile type=\"Collection\">{sets}</VTKFile>"));
-        write("all.pvd", set(0, "a_10.vtu") + &set(1, "a_20.vtu")).expect("written");
+        write("all.pvd", set(3, "a_10.vtu") + &set(1, "a_20.vtu") + &set(2, "a_4.vtu") + &set(2, "b.vtu"))
+            .expect("written");
         write("one.pvd", set(0, "a_10.vtu")).expect("written");
-        let files = |name| Frames::find(&[at(name)]).map(|f| f.all.into_iter().map(|f| f.file).collect::<Vec<_>>());
-        assert_eq!(files("all.pvd").expect("steps"), [at("a_10.vtu"), at("a_20.vtu")]);
+        write("late.pvd", set(4, "c.vtu") + &set(6, "d.vtu")).expect("written");
+        write("same.pvd", set(2, "c.vtu") + &set(6, "d.vtu")).expect("written");
+        let found = |names: &[&str]| Frames::find(&names.iter().map(|name| at(name)).collect::<Vec<_>>());
+        let files = |name| found(&[name]).map(|f| f.all.into_iter().map(|f| f.file).collect::<Vec<_>>());
+        // In the order of time, not of names; what has several files is called as what names them.
+        assert_eq!(files("all.pvd").expect("steps"), [at("a_20.vtu"), at("all.pvd"), at("a_10.vtu")]);
         assert_eq!(files("one.pvd").expect("one"), [at("one.pvd")]);
+        let both = found(&["late.pvd", "all.pvd"]).expect("both");
+        assert_eq!(both.all.iter().map(|f| f.number).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
+        assert_eq!(both.times(), Some(vec![0.0, 1.0, 2.0, 3.0, 5.0]));
+        assert_eq!(both.all[1].files(), [at("a_4.vtu"), at("b.vtu")]);
+        // As a pattern it is the same.
+        assert_eq!(found(&["al*.pvd"]).expect("a pattern").all.len(), 3);
+        let refused = |names: &[&str], words: &[&str]| {
+            let said = found(names).expect_err("refused").to_string();
+            assert!(words.iter().all(|w| said.contains(w)), "{said}");
+        };
+        refused(&["all.pvd", "same.pvd"], &["all.pvd", "same.pvd", "at 2"]);
+        refused(&["all.pvd", "one.pvd"], &["one.pvd", "all.pvd has time steps"]);
         std::fs::write(at("torn.pvd"), "<VTKFile").expect("written");
         assert!(files("torn.pvd").expect_err("torn").to_string().contains("torn.pvd"));
     }

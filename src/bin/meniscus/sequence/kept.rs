@@ -12,6 +12,7 @@ pub fn label(exposures: &[Exposure], frames: &Frames, memory: usize) -> String {
         hash.update(&(bytes.len() as u64).to_le_bytes());
         hash.update(bytes);
     };
+    let of = |frame: usize| frames.all()[frame].files().iter().map(|file| identity(file)).collect::<String>();
     add(env!("CARGO_PKG_VERSION").as_bytes());
     for exposure in exposures {
         let mut picture = exposure.picture.clone();
@@ -19,16 +20,16 @@ pub fn label(exposures: &[Exposure], frames: &Frames, memory: usize) -> String {
         add(picture.record().to_string().as_bytes());
         add(environment.as_deref().map(identity).unwrap_or_default().as_bytes());
         let moment = &exposure.moment;
-        add(identity(&frames.all()[moment.frame].file).as_bytes());
+        add(of(moment.frame).as_bytes());
         if moment.toward > 0.0 {
-            add(identity(&frames.all()[moment.frame + 1].file).as_bytes());
+            add(of(moment.frame + 1).as_bytes());
             add(&moment.toward.to_le_bytes());
             add(&moment.interval.to_le_bytes());
         }
         if let Some(upper) = exposure.picture.keep_class_below {
             add(&upper.to_le_bytes());
             for frame in moment.before().saturating_sub(memory)..moment.before() {
-                add(identity(&frames.all()[frame].file).as_bytes());
+                add(of(frame).as_bytes());
             }
         }
     }

@@ -54,7 +54,7 @@ impl Memory {
         read: &mut Read,
     ) -> Result<Held, Box<dyn Error>> {
         let (picture, moment) = (&exposure.picture, &exposure.moment);
-        let most = plan.memory + usize::from(plan.counts);
+        let most = plan.looks_back();
         if most == 0 || particles.0.classes.is_some() || picture.preparer().on_device() {
             return Ok(Held::default());
         }

@@ -6,19 +6,23 @@ use super::{
     check,
     film::Kind,
     frames::{Frames, FramesError, Pattern},
-    kept, table,
+    kept, ms_since, table,
 };
 use crate::{
     camera_file::Cameras,
     compositing::{self, Background},
     outputs,
     picture::Picture,
-    scene::Prepare,
+    scene::{Prepare, Scene},
+    scene_file::{SceneFile, SceneFileError},
 };
 use glam::{DVec3, Vec3};
-use meniscus::io::images;
+use meniscus::{
+    host::DeviceInfo,
+    io::{images, particles::ParticleFile},
+};
 use rayon::prelude::*;
-use std::{error::Error, path::PathBuf};
+use std::{error::Error, path::PathBuf, time::Instant};
 
 pub const NO_PICTURES: &str = "parts of a film are numbered pictures: name them too, such as --output 'out/####.png'";
 
@@ -44,6 +48,8 @@ pub struct Exposure {
 
 pub struct Plan {
     pub frames: Frames,
+    /// The first of them, where it had to be prepared.
+    pub first: Option<First>,
     /// Whether pictures are taken between frames.
     pub between: bool,
     pub shots: Vec<Shot>,
@@ -66,22 +72,61 @@ struct Settled {
     absorption: Vec3,
 }
 
+/// The first frame as it was prepared to find what was left open: whoever draws it takes it from here.
+pub struct First {
+    /// What may be drawn of it, if it is drawn.
+    pub scene: Option<Scene>,
+    /// What it was prepared as.
+    picture: Picture,
+    /// What was read, if that is needed once more.
+    pub read: Option<(ParticleFile, usize)>,
+    pub read_ms: f64,
+    pub prepare_ms: f64,
+}
+
+impl First {
+    /// Whether it is what would be prepared for this.
+    pub fn is(&self, exposure: &Exposure) -> bool {
+        let prepared = |p: &Picture| (p.preparation, p.preparer(), p.drop_invalid, p.max_memory);
+        let picture = &exposure.picture;
+        let own = self.scene.as_ref().map(|scene| scene.particles.radius);
+        let radius = own.is_some() && picture.radius.map(|r| r as f32) == own;
+        // What classes hold is decided by the frames before.
+        let own = radius && picture.keep_class_below.is_none() && prepared(picture) == prepared(&self.picture);
+        own && exposure.moment.frame == 0 && exposure.moment.toward == 0.0
+    }
+}
+
 impl Settled {
-    fn of(picture: &Picture, frames: &Frames) -> Result<Settled, Box<dyn Error>> {
+    /// Prepares the first frame if anything is left open; its particles are kept as well if `again` they are needed.
+    fn of(
+        picture: &Picture,
+        frames: &Frames,
+        device: Option<&DeviceInfo>,
+        again: bool,
+    ) -> Result<(Settled, Option<First>), Box<dyn Error>> {
         let camera = &picture.camera;
         let given = camera.eye.is_some() && camera.target.is_some() && picture.absorption_given;
         if let Some(radius) = picture.radius.filter(|_| given) {
             let absorption = picture.settings.liquid.absorption;
-            return Ok(Settled { radius, eye: camera.eye, target: camera.target, absorption });
+            return Ok((Settled { radius, eye: camera.eye, target: camera.target, absorption }, None));
         }
-        let scene = picture.load(Some(&frames.all()[0].file), picture.preparer())?;
+        let begin = Instant::now();
+        let first = &frames.all()[0];
+        let particles = first.read(picture)?;
+        let read_ms = ms_since(begin);
+        let begin = Instant::now();
+        let read = again.then(|| particles.clone());
+        let scene = picture.prepared(device, particles, Some(&first.file), picture.preparer())?;
+        let prepare_ms = ms_since(begin);
         let settled = picture.clone().settled(&scene)?;
-        Ok(Settled {
+        let found = Settled {
             radius: settled.radius.unwrap_or(f64::from(scene.particles.radius)),
             eye: settled.camera.eye,
             target: settled.camera.target,
             absorption: settled.settings.liquid.absorption,
-        })
+        };
+        Ok((found, Some(First { scene: Some(scene), picture: picture.clone(), read, read_ms, prepare_ms })))
     }
 
     fn complete(&self, picture: &mut Picture) {
@@ -95,58 +140,81 @@ impl Settled {
     }
 }
 
-impl Plan {
-    pub fn new(args: &Args) -> Result<Plan, Box<dyn Error>> {
+/// How the film is seen at its seconds, as it is asked for.
+struct Views<'a> {
+    args: &'a Args,
+    scene_file: Option<SceneFile>,
+    cameras: Cameras,
+}
+
+impl Views<'_> {
+    fn base(&self, time: f64) -> Result<Picture, SceneFileError> {
+        self.scene_file.as_ref().map_or_else(|| Ok(Picture::default()), |file| file.at(time))
+    }
+
+    fn at(&mut self, time: f64, frame: f64) -> Result<Picture, Box<dyn Error>> {
+        let (base, args) = (self.base(time)?, self.args);
+        if args.turn.is_some() && base.camera.file.is_some() {
+            return Err("--turn goes around a target, and a camera file has none: leave one of them out".into());
+        }
+        let mut picture = args.options.over_seen(base, None, Some(frame), &mut self.cameras)?;
+        args.compositing.apply(&mut picture);
+        // A tenth above the threshold is plenty.
+        let upper = args.keep_class_below.map_or(1.1 * picture.preparation.splash_threshold, |u| u as f32);
+        picture.keep_class_below = args.memory.map(|_| upper);
+        picture.prepare.get_or_insert(Prepare::Cpu);
+        Ok(picture)
+    }
+}
+
+/// What is known of a sequence before particles are read.
+pub struct Outline<'a> {
+    args: &'a Args,
+    views: Views<'a>,
+    frames: Frames,
+    patterns: Vec<Pattern>,
+    /// Each picture's number, and the seconds of the film at which it is exposed: of all, and those that are to be made.
+    all: usize,
+    made: Vec<(u64, Vec<f64>)>,
+    /// The first of all, with what is left open.
+    picture: Picture,
+}
+
+impl<'a> Outline<'a> {
+    pub fn new(args: &'a Args) -> Result<Outline<'a>, Box<dyn Error>> {
         if args.options.camera_frame.is_some() {
             return Err("--camera-frame is one frame, and a sequence has many: leave it out".into());
         }
         if args.options.time.is_some() {
             return Err("--time is one moment, and a sequence has many: leave it out".into());
         }
-        let memory = args.memory.unwrap_or(0) as usize;
         let scene_file = args.options.scene_file()?;
-        let base = |time| scene_file.as_ref().map_or_else(|| Ok(Picture::default()), |file| file.at(time));
-        let mut cameras = Cameras::default();
-        let mut at = |time, frame| -> Result<Picture, Box<dyn Error>> {
-            let base = base(time)?;
-            if args.turn.is_some() && base.camera.file.is_some() {
-                return Err("--turn goes around a target, and a camera file has none: leave one of them out".into());
-            }
-            let mut picture = args.options.over_seen(base, None, Some(frame), &mut cameras)?;
-            args.compositing.apply(&mut picture);
-            // A tenth above the threshold is plenty.
-            let upper = args.keep_class_below.map_or(1.1 * picture.preparation.splash_threshold, |u| u as f32);
-            picture.keep_class_below = (memory > 0).then_some(upper);
-            picture.prepare.get_or_insert(Prepare::Cpu);
-            Ok(picture)
-        };
-        let particles = base(0.0)?.particles;
+        let mut views = Views { args, scene_file, cameras: Cameras::default() };
+        let particles = views.base(0.0)?.particles;
         let inputs = match &particles {
             Some(particles) if args.inputs.is_empty() => std::slice::from_ref(particles),
             _ => &args.inputs,
         };
         let frames = Frames::find(inputs)?;
+        let times = Times::new(args, &frames)?;
         let patterns = patterns(args)?;
         if args.part.is_some() && patterns.is_empty() {
             return Err(NO_PICTURES.into());
         }
-        let times = Times::new(args, &frames);
-        let pictures = times.pictures();
-        let numbers: Vec<_> = pictures.iter().map(|p| p.0).collect();
-        let wanted = |n: &u64| args.frames.is_none_or(|s| s.has(*n));
-        let (first, last) = (numbers[0], numbers[numbers.len() - 1]);
-        let named: Vec<_> =
-            numbers.iter().filter(|n| wanted(n)).flat_map(|n| patterns.iter().map(|p| p.name(*n))).collect();
-        if let Some(selection) = args.frames.filter(|_| !numbers.iter().any(wanted)) {
+        let mut made = times.pictures()?;
+        let (all, first, last) = (made.len(), made[0].0, made[made.len() - 1].0);
+        made.retain(|(number, _)| args.frames.is_none_or(|s| s.has(*number)));
+        if let Some(selection) = args.frames.filter(|_| made.is_empty()) {
             return Err(FramesError::Unselected { selection, first, last }.into());
         }
+        let named: Vec<_> = made.iter().flat_map(|(n, _)| patterns.iter().map(|p| p.name(*n))).collect();
         let mut others: Vec<outputs::Named> = Vec::new();
         others.extend(args.options.scene.as_deref().map(|p| ("the scene file (--scene)", p)));
-        others.extend(frames.all().iter().map(|f| ("a particle file", f.file.as_path())));
+        others.extend(frames.all().iter().flat_map(|f| f.files()).map(|f| ("a particle file", f.as_path())));
 
-        let picture = at(0.0, frames.number(0, 0.0))?;
+        let picture = views.at(0.0, frames.number(0, 0.0))?;
         others.extend(picture.environment.file.as_deref().map(|p| ("the environment map (--env)", p)));
-        if memory > 0 && picture.preparer().on_device() {
+        if args.memory.is_some() && picture.preparer().on_device() {
             return Err("--memory keeps classes that the CPU finds: leave it out, or use --prepare cpu".into());
         }
         compositing::check(&picture, args.output.iter().map(PathBuf::as_path))?;
@@ -156,16 +224,31 @@ impl Plan {
             return Err(format!("{}: films have no transparency: {remedy}", film.display()).into());
         }
         check(args, &named, &others)?;
-        let settled = Settled::of(&picture, &frames)?;
+        Ok(Outline { args, views, frames, patterns, all, made, picture })
+    }
+
+    /// How many pictures are to be made, whoever makes them.
+    pub fn count(&self) -> usize {
+        self.made.len()
+    }
+
+    /// All of it; where anything is left open, after preparing the first frame, for a device if there is one.
+    pub fn plan(self, device: Option<&DeviceInfo>) -> Result<Plan, Box<dyn Error>> {
+        let Outline { args, mut views, frames, patterns, all, made, picture } = self;
+        let memory = args.memory.unwrap_or(0) as usize;
+        let counts = args.stats.is_some();
+        let between = args.step.is_some();
+        let again = frames.all().len() > 1 && (between || counts) || memory > 0;
+        let (settled, mut first) = Settled::of(&picture, &frames, device, again)?;
+        let times = Times::new(args, &frames)?;
         // All of it over all pictures: a film that begins anew goes on turning.
-        let turn = args.turn.unwrap_or(0.0) / pictures.len() as f64;
+        let turn = args.turn.unwrap_or(0.0) / all as f64;
         let mut shots = Vec::new();
-        let made: Vec<_> = pictures.iter().filter(|p| wanted(&p.0)).collect();
         for (number, exposed) in &made[args.part.map_or(0..made.len(), |part| part.range(made.len()))] {
             let expose = |time: &f64| -> Result<_, Box<dyn Error>> {
                 let moment = times.moment(*time);
-                let mut picture = at(*time, frames.number(moment.frame, moment.toward))?;
-                picture.particles = None;
+                let mut picture = views.at(*time, frames.number(moment.frame, moment.toward))?;
+                (picture.particles, picture.particles_time) = (None, None);
                 settled.complete(&mut picture);
                 picture.camera.orbit += turn * (time * args.fps);
                 Ok(Exposure { picture, moment })
@@ -179,12 +262,23 @@ impl Plan {
         let size = picture.size;
         let finished = |s: &Shot| !s.files.is_empty() && s.files.iter().all(|f| kept::finished(f, &s.label, size));
         shots.par_iter_mut().for_each(|s| s.kept = finished(s));
+        if let Some(first) = &mut first
+            && !shots.iter().find(|s| !s.kept).is_some_and(|s| first.is(&s.exposures[0]))
+        {
+            first.scene = None;
+        }
         let mut films: Vec<_> = args.output.iter().filter_map(|p| Some((p.clone(), Kind::of(p)?))).collect();
         if args.part.is_some() {
             films.clear();
         }
-        let (between, stats) = (args.step.is_some(), table::path(args));
-        Ok(Plan { frames, between, shots, memory, counts: args.stats.is_some(), films, stats })
+        Ok(Plan { frames, first, between, shots, memory, counts, films, stats: table::path(args) })
+    }
+}
+
+impl Plan {
+    /// How many frames before a picture's are looked at.
+    pub fn looks_back(&self) -> usize {
+        if self.frames.all().len() > 1 { self.memory + usize::from(self.counts) } else { self.memory }
     }
 
     /// The first picture's name, and the last one's; and films.

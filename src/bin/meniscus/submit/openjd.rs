@@ -19,7 +19,10 @@ pub fn files(job: &Job) -> Result<Engined, SubmitError> {
         json!({"actions": {"onRun": {"command": "sh", "args": arguments}}})
     };
     // Without defaults: those of paths must be relative, and are taken from the template's folder.
-    let parameter = |name: &str, object: &str, about: &str| json!({"name": name, "type": "PATH", "objectType": object, "dataFlow": "NONE", "description": about});
+    let parameter = |name: &str, object: &str, about: &str| {
+        let (kind, flow) = ("PATH", "NONE");
+        json!({"name": name, "type": kind, "objectType": object, "dataFlow": flow, "description": about})
+    };
     let values = json!({"Program": job.program, "Folder": job.folder});
     let template = json!({
         "specificationVersion": "jobtemplate-2023-09",
