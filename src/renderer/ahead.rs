@@ -215,6 +215,7 @@ mod tests {
         storage_size: 128 << 20,
         texels_size: 16 * (128 << 20),
         memory: 1 << 34,
+        cpu: true,
     };
 
     fn refused(method: &str, amount: Amount) -> Option<String> {
