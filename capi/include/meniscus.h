@@ -37,6 +37,16 @@
 #define MENISCUS_ABI_VERSION 1
 
 /**
+ * MeniscusMemoryRequest::location: on the device, DEVICE_LOCAL where there is such memory.
+ */
+#define MENISCUS_LOCATION_DEVICE 0
+
+/**
+ * MeniscusMemoryRequest::location: where the host writes and the device reads: HOST_VISIBLE and HOST_COHERENT, and mapped.
+ */
+#define MENISCUS_LOCATION_UPLOAD 1
+
+/**
  * MeniscusFrame::background: the environment, and before it the scene. Every pixel of the output is written, with alpha 1.
  */
 #define MENISCUS_BACKGROUND_ENVIRONMENT 0
@@ -690,6 +700,101 @@ typedef struct {
 } MeniscusReport;
 
 /**
+ * Memory that the renderer asks for.
+ */
+typedef struct {
+    /**
+     * sizeof(MeniscusMemoryRequest), of the library's version.
+     */
+    size_t struct_size;
+    /**
+     * What for, for debuggers; it ends with a 0, and is there until the call returns.
+     */
+    const char *name;
+    /**
+     * Size in bytes at least, as Vulkan has said it.
+     */
+    VkDeviceSize size;
+    /**
+     * What its offset has to be a multiple of.
+     */
+    VkDeviceSize alignment;
+    /**
+     * Types that will do, one bit each (VkMemoryRequirements::memoryTypeBits).
+     */
+    uint32_t memory_type_bits;
+    /**
+     * MENISCUS_LOCATION_...
+     */
+    uint32_t location;
+    /**
+     * VK_TRUE where a buffer is bound to it, or else an optimally tiled image: of one allocation they lie bufferImageGranularity apart.
+     */
+    VkBool32 linear;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+} MeniscusMemoryRequest;
+
+/**
+ * A piece of device memory that one resource is bound to.
+ */
+typedef struct {
+    /**
+     * What it is a part of.
+     */
+    VkDeviceMemory memory;
+    /**
+     * Where it begins there, in bytes.
+     */
+    VkDeviceSize offset;
+    /**
+     * Its first byte as the host sees it; of MENISCUS_LOCATION_UPLOAD alone.
+     */
+    void *mapped;
+    /**
+     * Whatever the allocator wants to have back with it.
+     */
+    void *own;
+} MeniscusAllocation;
+
+/**
+ * Fills an allocation, which comes as zeros, and gives VK_SUCCESS; or says why there is no memory.
+ */
+typedef VkResult (*PFN_meniscusAllocate)(void *user_data, const MeniscusMemoryRequest *request, MeniscusAllocation *allocation);
+
+/**
+ * Takes an allocation back as it was given, which no frame uses any more.
+ */
+typedef void (*PFN_meniscusFree)(void *user_data, const MeniscusAllocation *allocation);
+
+/**
+ * An allocator of device memory. It is called by calls that make, record or destroy something, on their threads: by those of
+ * several renderers at a time, if it serves several. What it gives is memory of the renderer's device, of a type that the request
+ * allows, aligned, and nobody else's, until it is taken back; where that is mapped, all of it can be written without flushes.
+ * It does not throw, and does not jump out.
+ */
+typedef struct {
+    /**
+     * sizeof(MeniscusAllocator).
+     */
+    size_t struct_size;
+    /**
+     * Given to both functions.
+     */
+    void *user_data;
+    /**
+     * Memory, or why there is none.
+     */
+    PFN_meniscusAllocate allocate;
+    /**
+     * Takes it back.
+     */
+    PFN_meniscusFree free;
+} MeniscusAllocator;
+
+/**
  * What the host lends a renderer. It keeps all of it alive until meniscus_renderer_destroy has returned, and destroys it
  * itself.
  */
@@ -734,6 +839,10 @@ typedef struct {
      * VK_TRUE if the instance has VK_EXT_debug_utils enabled: then resources get names and passes labels.
      */
     VkBool32 debug_utils;
+    /**
+     * Where device memory comes from, read before the call returns; or null for an allocator of the renderer's own.
+     */
+    const MeniscusAllocator *allocator;
 } MeniscusHost;
 
 /**
@@ -1053,10 +1162,11 @@ MeniscusStatus meniscus_renderer_warm_up_like(MeniscusRenderer *renderer,
 
 /**
  * Makes a renderer for outputs of one format: UNORM formats receive colour encoded as sRGB, float and _SRGB formats linear colour.
- * It has an allocator of its own on the host's device.
+ * Without an allocator of the host's it has one of its own on the host's device.
  *
  * # Safety
- * * The handles in `host` are of each other, alive, and stay so until meniscus_renderer_destroy has returned.
+ * * The handles in `host` are of each other, alive, and stay so until meniscus_renderer_destroy has returned; so is what its
+ *   allocator's functions need.
  * * The device was created with what meniscus_required_features turns on, and with largePoints if `host` says so.
  * * `renderer` is null or can be written.
  */

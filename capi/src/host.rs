@@ -1,11 +1,13 @@
 //! The host's Vulkan, as C has it: handles, and where its functions are found.
 
 use crate::{
+    allocator::MeniscusAllocator,
     status::{Failure, MeniscusStatus, guard},
-    versioned::{self, Versioned},
+    versioned::{self, Versioned, read_some},
 };
 use renderer::{
     Host,
+    allocator::MemoryAllocator,
     ash::{
         self,
         vk::{
@@ -47,13 +49,15 @@ pub struct MeniscusHost {
     pub large_points: VkBool32,
     /// VK_TRUE if the instance has VK_EXT_debug_utils enabled: then resources get names and passes labels.
     pub debug_utils: VkBool32,
+    /// Where device memory comes from, read before the call returns; or null for an allocator of the renderer's own.
+    pub allocator: *const MeniscusAllocator,
 }
 
 /// Null stands for none.
 #[allow(non_camel_case_types)]
 pub type PFN_vkGetInstanceProcAddr = Option<vk::PFN_vkGetInstanceProcAddr>;
 
-// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers, handles and a pointer that may be null.
+// SAFETY: repr(C); its size first; no padding (a test adds it up); numbers, handles and pointers that may be null.
 unsafe impl Versioned for MeniscusHost {
     const NAME: &'static str = "MeniscusHost";
     const LEAST: usize = offset_of!(MeniscusHost, pipeline_cache);
@@ -114,11 +118,29 @@ fn lacking(what: &str, function: &CStr, remedy: &str) -> Failure {
     Failure::new(MeniscusStatus::ErrorUnsupported, message)
 }
 
+/// An allocator for a renderer whose host has none.
+fn own_allocator(
+    instance: &ash::Instance,
+    device: &ash::Device,
+    physical_device: VkPhysicalDevice,
+) -> Result<Allocator, Failure> {
+    let description = AllocatorCreateDesc {
+        instance: instance.clone(),
+        device: device.clone(),
+        physical_device,
+        debug_settings: Default::default(),
+        buffer_device_address: false,
+        allocation_sizes: Default::default(),
+    };
+    Allocator::new(&description)
+        .map_err(|e| Failure::new(MeniscusStatus::ErrorMemory, format!("the renderer's allocator: {e}")))
+}
+
 impl MeniscusHost {
-    /// What the renderer borrows, with an allocator made for it.
+    /// What the renderer borrows, with its allocator or one made for it.
     ///
     /// # Safety
-    /// The handles are alive or null, and of each other.
+    /// The handles are alive or null, and of each other; and as [`read_some`] for the allocator.
     pub(crate) unsafe fn borrow(&self) -> Result<Host, Failure> {
         let physical = self.physical_device;
         // SAFETY: this function's contract.
@@ -145,17 +167,11 @@ impl MeniscusHost {
         }
         // SAFETY: as above; what is called of it is there.
         let device = unsafe { ash::Device::load(instance.fp_v1_0(), self.device) };
-        let description = AllocatorCreateDesc {
-            instance: instance.clone(),
-            device: device.clone(),
-            physical_device: physical,
-            debug_settings: Default::default(),
-            buffer_device_address: false,
-            allocation_sizes: Default::default(),
+        // SAFETY: this function's contract.
+        let allocator: Arc<dyn MemoryAllocator> = match unsafe { read_some(self.allocator) }? {
+            Some(allocator) => Arc::new(allocator.get()?),
+            None => Arc::new(Mutex::new(own_allocator(&instance, &device, physical)?)),
         };
-        let allocator = Allocator::new(&description)
-            .map_err(|e| Failure::new(MeniscusStatus::ErrorMemory, format!("the renderer's allocator: {e}")))?;
-        let allocator = Arc::new(Mutex::new(allocator));
         let mut host = Host::new(instance.clone(), device.clone(), physical, self.queue_family, allocator);
         host.frames_in_flight = self.frames_in_flight.max(1);
         host.large_points = self.large_points != 0;

@@ -10,6 +10,7 @@
 #[cfg(panic = "abort")]
 compile_error!("meniscus-capi turns panics into a status: build it with panic = \"unwind\"");
 
+mod allocator;
 mod auto;
 mod camera;
 mod frame;

@@ -56,10 +56,11 @@ pub(crate) unsafe fn with(
 }
 
 /// Makes a renderer for outputs of one format: UNORM formats receive colour encoded as sRGB, float and _SRGB formats linear colour.
-/// It has an allocator of its own on the host's device.
+/// Without an allocator of the host's it has one of its own on the host's device.
 ///
 /// # Safety
-/// * The handles in `host` are of each other, alive, and stay so until meniscus_renderer_destroy has returned.
+/// * The handles in `host` are of each other, alive, and stay so until meniscus_renderer_destroy has returned; so is what its
+///   allocator's functions need.
 /// * The device was created with what meniscus_required_features turns on, and with largePoints if `host` says so.
 /// * `renderer` is null or can be written.
 #[unsafe(no_mangle)]

@@ -32,7 +32,7 @@ fn check_size<T: Versioned>(size: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-fn null(name: &str) -> Failure {
+pub(crate) fn null(name: &str) -> Failure {
     Failure::argument(format!("the pointer to {name} is null: give one"))
 }
 

@@ -1,7 +1,7 @@
 //! Sizes that C sets, and layouts that never change.
 
 use super::*;
-use crate::{camera::*, frame::*, host::*, prepare::*, report::*, status::MeniscusStatus};
+use crate::{allocator::*, camera::*, frame::*, host::*, prepare::*, report::*, status::MeniscusStatus};
 use std::mem::offset_of;
 
 #[repr(C)]
@@ -130,7 +130,10 @@ fn layouts_stay() {
         };
     }
     let sizes = [
-        (64, ends!(MeniscusHost, debug_utils: u32)),
+        (72, ends!(MeniscusHost, allocator: *const MeniscusAllocator)),
+        (32, ends!(MeniscusAllocator, free: PFN_meniscusFree)),
+        (48, ends!(MeniscusMemoryRequest, reserved: u32)),
+        (32, ends!(MeniscusAllocation, own: *mut std::ffi::c_void)),
         (160, ends!(MeniscusCamera, reserved: u32)),
         (88, ends!(MeniscusPositions, count_offset: u64)),
         (48, ends!(MeniscusScene, origin: [u32; 2])),
