@@ -127,7 +127,8 @@ impl SceneInput {
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct FrameInput<'a> {
-    /// Which of the frames in flight this is.
+    /// Which of the frames in flight this is. That the frame last recorded into it has completed nobody checks: its descriptors are
+    /// written anew.
     pub slot: usize,
     /// Camera.
     pub camera: &'a Camera,
@@ -154,7 +155,7 @@ pub struct FrameInput<'a> {
     /// Layout the output is in, before and after: one in which it can be attached. Usually `COLOR_ATTACHMENT_OPTIMAL`.
     pub output_layout: vk::ImageLayout,
     /// Where the view begins in the output and in the images of [`FrameInput::surface`], in pixels: they may be larger than it. What
-    /// is beside it stays as it is.
+    /// is beside it stays as it is. Sizes of the host's images are not known here: that the view ends within them is the host's to see to.
     pub origin: [u32; 2],
     /// What later passes are told of the first surface: its depth, its normal, its motion, where it is.
     pub surface: SurfaceOutputs,
@@ -210,6 +211,7 @@ impl<'a> FrameInput<'a> {
                 ));
             }
         }
+        self.check_apart()?;
         if self.positions.is_some_and(|p| p.count > 0 && p.buffer == vk::Buffer::null()) {
             return Err(Error::parameter("buffer of positions", "null", "give the buffer that holds them"));
         }
@@ -218,6 +220,21 @@ impl<'a> FrameInput<'a> {
         }
         if self.positions.is_some_and(|p| p.count > 0 && p.ids.is_some_and(|ids| ids.buffer == vk::Buffer::null())) {
             return Err(Error::parameter("buffer of ids", "null", "give the buffer that holds them, or no ids"));
+        }
+        Ok(())
+    }
+
+    /// Refuses a view that is written and read, or written as two things.
+    fn check_apart(&self) -> Result<(), Error> {
+        let surface = Says::ALL.into_iter().filter_map(|says| Some((says.name(), self.surface.of(says)?.view)));
+        let written: Vec<_> = [("output", self.output)].into_iter().chain(surface).collect();
+        let scene = self.scene.into_iter().flat_map(|s| [("scene colour", s.color), ("scene depth", s.depth)]);
+        let read: Vec<_> = scene.chain(self.environment.map(|e| ("environment", e.view))).collect();
+        for (i, &(what, view)) in written.iter().enumerate() {
+            if let Some((other, _)) = written[..i].iter().chain(&read).find(|other| other.1 == view) {
+                let is = format!("the view that is the {other}, too");
+                return Err(Error::parameter(what, is, "give each an image of its own: a frame writes this one"));
+            }
         }
         Ok(())
     }

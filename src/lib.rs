@@ -13,6 +13,10 @@
 //! * Frames are submitted to one queue in the order they were recorded. Before the host records into a slot again
 //!   (`slot < frames_in_flight`), the frame last recorded into it has completed. Replaced resources are kept until
 //!   then, and destroyed without waiting.
+//! * What a host waits for, by masks: buffers of positions are read at `COMPUTE_SHADER` / `SHADER_STORAGE_READ`; the host's scene and
+//!   environment at `FRAGMENT_SHADER` / `SHADER_SAMPLED_READ`; outputs are read and written at `COLOR_ATTACHMENT_OUTPUT` /
+//!   `COLOR_ATTACHMENT_READ | WRITE`, and one with depth ([`SurfaceOutputs::depth`]) at `EARLY_FRAGMENT_TESTS | LATE_FRAGMENT_TESTS` /
+//!   `DEPTH_STENCIL_ATTACHMENT_READ | WRITE`: before the frame make them visible to that, after it wait for that.
 //! * A frame that was recorded and never runs (its command buffer was reset, or is not submitted) is said to be so with
 //!   [`Renderer::abandon`] before anything else is recorded. What [`Renderer::set_environment`] recorded has to run.
 //! * Several views of one picture's size are as many calls of [`Renderer::record`], each with a slot of its own: make

@@ -116,6 +116,17 @@ macro_rules! choices {
 }
 pub(crate) use choices;
 
+/// What documentation calls a unit.
+macro_rules! unit {
+    ("") => {
+        "none"
+    };
+    ($unit:tt) => {
+        $unit
+    };
+}
+pub(crate) use unit;
+
 /// A struct of parameters: for each its documentation, type and default, then unit, what it must be, and a check of that.
 /// `"a" if other else "b"` is a unit that hangs on another parameter. `enlarged |all, times| …` says what becomes of one that
 /// is counted in pixels ([`Parameters::enlarge`]). Attributes in brackets before the struct take the place of
@@ -130,7 +141,7 @@ macro_rules! parameters {
     };
     ([$(#[$meta:meta])*] $(#[doc = $about:literal])+ pub struct $Name:ident { $(
         $(#[doc = $doc:literal])+
-        $field:ident: $Type:ty = $default:expr, $unit:literal $(if $when:ident else $other:literal)?, $range:literal
+        $field:ident: $Type:ty = $default:expr, $unit:tt $(if $when:ident else $other:literal)?, $range:literal
             => $check:expr $(, enlarged |$all:ident, $times:ident| $enlarged:expr)?;
     )* }) => {
         $(#[doc = $about])+
@@ -140,7 +151,7 @@ macro_rules! parameters {
         $(#[$meta])*
         pub struct $Name { $(
             $(#[doc = $doc])+
-            #[doc = concat!("\n\n", "Unit: ", $unit, $(" if `", stringify!($when), "`, else ", $other,)? ". Use ", $range, ". Default: `", stringify!($default), "`.")]
+            #[doc = concat!("\n\n", "Unit: ", $crate::parameters::unit!($unit), $(" if `", stringify!($when), "`, else ", $other,)? ". Use ", $range, ". Default: `", stringify!($default), "`.")]
             pub $field: $Type,
         )* }
 

@@ -221,7 +221,8 @@ impl Renderer {
         self.retired.push(self.frame + 1, resource);
     }
 
-    /// Records one frame into the host's command buffer. After an error the command buffer is not to be submitted.
+    /// Records one frame into the host's command buffer. After an error the command buffer is not to be submitted; there is nothing to
+    /// abandon, and the slot takes another frame.
     ///
     /// # Safety
     /// * `cmd` is recording, outside rendering, and goes to a queue of the family in [`Host`], after all frames
@@ -237,6 +238,9 @@ impl Renderer {
     ///   them, whole, where it is said to begin. Their earlier writes are
     ///   visible to sampling in fragment shaders, and those of the output and of the surface's images to the attachment stages.
     pub unsafe fn record(&mut self, cmd: vk::CommandBuffer, input: &FrameInput) -> Result<(), Error> {
+        if cmd == vk::CommandBuffer::null() {
+            return Err(Error::parameter("command buffer", "null", "give one that is recording"));
+        }
         input.settings.validate()?;
         input.camera.validate()?;
         input.surface.check(self.limits.storage_size)?;

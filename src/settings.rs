@@ -97,6 +97,10 @@ impl Settings {
                 return group.set(name, text);
             }
         }
+        let known: Vec<_> = self.groups().into_iter().flat_map(Parameters::parameters).collect();
+        if !known.iter().any(|p| p.name == name) {
+            return Err(crate::parameters::unknown(name, &known));
+        }
         self.method.set(name, text)
     }
 

@@ -1131,9 +1131,12 @@ MeniscusStatus meniscus_density_destroy(MeniscusDensity *density);
  * * The frame last recorded into its slot has completed on the device.
  * * The buffers of its positions are alive until the frame has completed, hold what is said of them, and their earlier writes are
  *   visible to reads in compute shaders. What is written there later waits for the frame's compute shaders.
- * * The output, and what there is of the scene and of an environment of the host's, are alive until the frame has completed and in
- *   the stated layouts; output and scene are of the renderer's size. Their earlier writes are visible to sampling in fragment
- *   shaders, and those of the output to the colour-attachment stage.
+ * * The buffers of moving particles are alive until the frame has completed, and their earlier writes are visible to reads in vertex
+ *   shaders.
+ * * The output, and what there is of the scene, of an environment of the host's and of MeniscusFrame::surface, are alive until the
+ *   frame has completed and in the stated layouts; all but the environment have the view in them, whole, where it is said to begin.
+ *   Their earlier writes are visible to sampling in fragment shaders, and those of the output and of the surface's images to the
+ *   attachment stages.
  */
 MeniscusStatus meniscus_renderer_record(MeniscusRenderer *renderer,
                                         VkCommandBuffer cmd,
@@ -1251,7 +1254,8 @@ MeniscusStatus meniscus_renderer_set_procedural_sky(MeniscusRenderer *renderer, 
 
 /**
  * Compiles, on all cores, whatever frames with these settings can need, so that recording them compiles nothing. To be called after
- * meniscus_renderer_resize, when there is time. `made`, if it is not null, tells how many pipelines were made.
+ * meniscus_renderer_resize, when there is time. Not what MeniscusFrame::surface asks for, whose formats are not known here: that is
+ * meniscus_renderer_warm_up_like's. `made`, if it is not null, tells how many pipelines were made.
  *
  * # Safety
  * `renderer` is null or a renderer; `settings` is null or settings; `made` is null or can be written.

@@ -16,9 +16,12 @@ use renderer::ash::vk::CommandBuffer as VkCommandBuffer;
 /// * The frame last recorded into its slot has completed on the device.
 /// * The buffers of its positions are alive until the frame has completed, hold what is said of them, and their earlier writes are
 ///   visible to reads in compute shaders. What is written there later waits for the frame's compute shaders.
-/// * The output, and what there is of the scene and of an environment of the host's, are alive until the frame has completed and in
-///   the stated layouts; output and scene are of the renderer's size. Their earlier writes are visible to sampling in fragment
-///   shaders, and those of the output to the colour-attachment stage.
+/// * The buffers of moving particles are alive until the frame has completed, and their earlier writes are visible to reads in vertex
+///   shaders.
+/// * The output, and what there is of the scene, of an environment of the host's and of MeniscusFrame::surface, are alive until the
+///   frame has completed and in the stated layouts; all but the environment have the view in them, whole, where it is said to begin.
+///   Their earlier writes are visible to sampling in fragment shaders, and those of the output and of the surface's images to the
+///   attachment stages.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn meniscus_renderer_record(
     renderer: *mut MeniscusRenderer,

@@ -237,7 +237,8 @@ pub unsafe extern "C" fn meniscus_renderer_set_procedural_sky(
 }
 
 /// Compiles, on all cores, whatever frames with these settings can need, so that recording them compiles nothing. To be called after
-/// meniscus_renderer_resize, when there is time. `made`, if it is not null, tells how many pipelines were made.
+/// meniscus_renderer_resize, when there is time. Not what MeniscusFrame::surface asks for, whose formats are not known here: that is
+/// meniscus_renderer_warm_up_like's. `made`, if it is not null, tells how many pipelines were made.
 ///
 /// # Safety
 /// `renderer` is null or a renderer; `settings` is null or settings; `made` is null or can be written.

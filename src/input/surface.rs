@@ -133,6 +133,11 @@ impl Says {
         }
     }
 
+    /// What the image is called in errors.
+    pub fn name(self) -> &'static str {
+        self.names()[0]
+    }
+
     /// Whether images that say this may be of a format.
     fn takes(self, format: vk::Format) -> bool {
         match self {
@@ -146,7 +151,9 @@ impl Says {
     fn remedy(self) -> String {
         match self {
             Says::Depth => "use R32_SFLOAT or a format with depth".into(),
-            Says::Normal => format!("use one of {SIGNED:?}, {HALVED:?}"),
+            Says::Normal => {
+                format!("use one of {SIGNED:?}, which hold n itself, or of {HALVED:?}, which hold (n + 1) / 2")
+            }
             Says::Motion => format!("use one of {VECTORS:?}"),
             Says::Reactive => format!("use one of {MASKS:?}"),
         }

@@ -23,7 +23,8 @@ use ash::vk;
 
 parameters! {
     /// The level of a density field on a sparse grid (Iwasaki06), each particle's share divided by its number density; splashes
-    /// are balls beside it.
+    /// are balls beside it, and so are particles of the body that the surface does not enclose: at the ends of sheets and threads, at
+    /// the corners of a block. What is counted is read with the feature `inspect` (`Renderer::counters`).
     pub struct Field {
         /// Distance of the grid's nodes; ours, by measurement: half as much changes little and has eight times the nodes
         spacing: f32 = 2.0, "particle radii", "1.5 to 3" => |s| (1.5..=3.0).contains(s);

@@ -108,7 +108,7 @@ pub struct Report {
 #[non_exhaustive]
 pub enum PrepareError {
     /// A radius outside of [`crate::space::RADII`].
-    #[error("particle radius {0:e}: {remedy}", remedy = device::radius_remedy())]
+    #[error("particle radius {0:?}: {remedy}", remedy = device::radius_remedy())]
     Radius(f32),
     /// An option out of its range.
     #[error("{name} is {value}: {remedy}")]

@@ -97,6 +97,9 @@ impl Renderer {
     /// before either background, in its own environment and the host's of either shape. Says how many pipelines were made; those that were there
     /// already count for nothing. To be called after [`Renderer::resize`], when there is time: at loading, say.
     ///
+    /// Not what [`FrameInput::surface`] asks for, whose formats are not known here: [`Renderer::warm_up_like`] makes those. Drivers on
+    /// CPUs (lavapipe) put off some of their own compiling to the first draw all the same.
+    ///
     /// That is dozens of pipelines; [`Renderer::warm_up_like`] makes those of one kind of frame. Without either, what a
     /// frame needs is compiled when it is first recorded.
     pub fn warm_up(&mut self, settings: &Settings) -> Result<usize, Error> {

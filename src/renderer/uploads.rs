@@ -232,7 +232,7 @@ pub(super) fn check_points_count(limits: &Limits, count: usize) -> Result<(), Er
 /// Refuses more particles than a density field takes, if that is what is drawn.
 pub(super) fn check_most_points(scene: &Scene) -> Result<(), Error> {
     if has_points(scene) && scene.count > MOST_POINTS {
-        let remedy = format!("a density field takes {MOST_POINTS} at most");
+        let remedy = format!("a density field takes {MOST_POINTS} at most: use fewer, or a method of maps (imai16)");
         return Err(Error::parameter("particles", scene.count, remedy));
     }
     Ok(())

@@ -124,7 +124,7 @@ fn memory_ends_with_other_particles() {
     run.refused(2, &["sequence", "f/*.csv", "-o", "#.png", "--keep-class-below", "0.5"], &["--memory"]);
 }
 
-/// Three rows that tremble, three that do not, of which one is of other particles in each frame, and eight other splashes, which come
+/// Three rows that tremble, three that do not, of which one is of other particles in each frame, and six other splashes, which come
 /// before all by their ids or after.
 fn renewed(run: &Run, folder: &str, shuffled: bool) {
     fs::create_dir_all(run.path(folder)).expect("folder");
@@ -135,7 +135,7 @@ fn renewed(run: &Run, folder: &str, shuffled: bool) {
             let id = if row == 5 { 5000 + 8 * frame + i } else { 1000 + 8 * row + i };
             rows.push(format!("{id},{},{},0.2\n", spacing * f64::from(i), 0.4 * f64::from(row)));
         }
-        for i in 0..8 {
+        for i in 0..6 {
             rows.push(format!("{},{},9,9\n", 2000 * (frame % 2) + 10 * frame + i, i));
         }
         if frame == 4 {

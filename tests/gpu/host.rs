@@ -5,7 +5,7 @@ use ash::vk::{self, Handle};
 use glam::Vec3;
 use meniscus::harness::SKY;
 use meniscus::{
-    Error, FrameInput, Particles, Renderer, SceneInput,
+    Error, FrameInput, Particles, Renderer, SceneInput, SurfaceOutput, SurfaceOutputs,
     host::{Canvas, Gpu, HostError, Upload},
     prepare::{DeviceIds, DevicePositions, Search},
     renderer::Amount,
@@ -243,6 +243,9 @@ fn what_the_caller_gets_wrong_is_said() {
             let bad = Particles { radius: f32::NAN, ..ball() };
             assert!(renderer.set_particles(&bad).is_err());
             let canvas = Canvas::new(gpu, vk::Format::R32G32B32A32_SFLOAT, 16, SIZE).expect("canvas");
+            // SAFETY: refused before anything is recorded.
+            let nowhere = unsafe { renderer.record(vk::CommandBuffer::null(), &input(&case, 0, canvas.view)) };
+            assert!(nowhere.unwrap_err().to_string().contains("command buffer is null"));
             let mut refused = |input: &FrameInput| {
                 gpu.run(|cmd| {
                     // SAFETY: refused before anything is recorded.
@@ -271,6 +274,13 @@ fn what_the_caller_gets_wrong_is_said() {
                 refused(&scene(canvas.view, vk::ImageLayout::UNDEFINED, 1.0)).contains("scene colour is in UNDEFINED")
             );
             assert!(refused(&scene(canvas.view, read, f32::NAN)).contains("cleared depth is NaN"));
+            assert!(
+                refused(&scene(canvas.view, read, 1.0)).contains("output is the view that is the scene colour, too")
+            );
+            let attached = vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL;
+            let normal = SurfaceOutput::new(canvas.view, vk::Format::R32G32B32A32_SFLOAT, attached);
+            let twice = input(&case, 0, canvas.view).surface(SurfaceOutputs::default().normal(normal));
+            assert!(refused(&twice).contains("surface normal is the view that is the output, too"));
             let mut narrow = case.clone();
             narrow.camera.projection.x_axis.x = 1e12;
             assert!(refused(&input(&narrow, 0, canvas.view)).contains("camera projection"));

@@ -7,7 +7,7 @@ use wgpu::hal::{api::Vulkan, vulkan};
 /// The family of wgpu's one queue.
 const FAMILY: u32 = 0;
 
-/// Checks that meniscus can run on an adapter; says what it lacks.
+/// Checks that meniscus can run on an adapter (wgpu's own: `adapter.as_hal::<wgpu::hal::api::Vulkan>()`); says what it lacks.
 pub fn check(adapter: &vulkan::Adapter) -> Result<(), Error> {
     let instance = adapter.shared_instance();
     let version = instance.instance_api_version();

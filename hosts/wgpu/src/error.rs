@@ -20,6 +20,19 @@ pub enum Error {
         "all {0} frames in flight are recorded, and not submitted: submit or drop their command buffers before recording more"
     )]
     Unsubmitted(usize),
+    /// An output of another format.
+    #[error("the output is of {given:?}, and the liquid draws into {wanted:?}: make another Liquid for this format")]
+    Format {
+        /// The output's.
+        given: wgpu::TextureFormat,
+        /// That of [`crate::Liquid::new`], with or without `Srgb`.
+        wanted: wgpu::TextureFormat,
+    },
+    /// A texture of the scene's is the output.
+    #[error(
+        "the output is a texture of the scene's: draw the scene into another, and copy its picture into the output first"
+    )]
+    SceneIsOutput,
     /// wgpu's own device.
     #[error("{0}")]
     Hal(#[from] wgpu::hal::DeviceError),

@@ -10,6 +10,14 @@
 //! queue.submit([sky, scene, before, water, overlay]);                     // scene and overlay: wgpu's, as ever
 //! ```
 //!
+//! Positions that a compute pass of wgpu's left in a buffer, and images of one's own for the first surface, go in by `more`, with the handle
+//! that wgpu has for them (`buffer.as_hal::<Vulkan>()`, then `raw_handle()`), and once wgpu knows that somebody else reads them: a
+//! `transition_resources` of the buffer to `BufferUses::STORAGE_READ_ONLY`, submitted before.
+//!
+//! ```text
+//! liquid.record(&frame, |input| input.positions(DevicePositions::packed(handle, count, radius).laid_out(0, 16)))?
+//! ```
+//!
 //! # What wgpu knows, and what is done to keep it true
 //!
 //! * **Layouts.** wgpu tracks of every texture the use it was last put to, and from the use follows the layout:

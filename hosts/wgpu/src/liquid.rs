@@ -56,6 +56,7 @@ pub struct Liquid {
     renderer: Option<Renderer>,
     places: Vec<Place>,
     next: usize,
+    output: wgpu::TextureFormat,
     raw: ash::Device,
     // Last: everything above is of this device.
     device: wgpu::Device,
@@ -97,7 +98,7 @@ impl Liquid {
         // SAFETY: the handles live as said above; the features are enabled, by this function's contract.
         let renderer = unsafe { Renderer::new(host, format) }?;
         let places = (0..frames_in_flight).map(|_| Place::default()).collect();
-        Ok(Liquid { renderer: Some(renderer), places, next: 0, raw, device: device.clone() })
+        Ok(Liquid { renderer: Some(renderer), places, next: 0, output, raw, device: device.clone() })
     }
 
     /// The renderer: particles, points, times, and so on.
@@ -130,6 +131,14 @@ impl Liquid {
         frame: &Frame<'a>,
         more: impl FnOnce(FrameInput<'a>) -> FrameInput<'a>,
     ) -> Result<[wgpu::CommandBuffer; 2], Error> {
+        // Of the view itself wgpu tells no format; that differs from its texture's in this at most.
+        let (given, wanted) = (frame.output.texture().format(), self.output);
+        if given.remove_srgb_suffix() != wanted.remove_srgb_suffix() {
+            return Err(Error::Format { given, wanted });
+        }
+        if frame.scene.iter().flat_map(|s| [s.color, s.depth]).any(|view| view.texture() == frame.output.texture()) {
+            return Err(Error::SceneIsOutput);
+        }
         let slot = self.slot()?;
         let used = |view: &'a wgpu::TextureView, state| wgpu::TextureTransition {
             texture: view.texture(),
