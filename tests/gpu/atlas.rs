@@ -123,12 +123,12 @@ fn a_view_in_an_atlas_is_the_view_alone() {
 fn origins_beyond_all_images_are_refused() {
     let case = case(ball());
     each_driver(|driver| {
-        let output = image(driver.gpu(), FLOAT4, 16, SIZE, ATTACHED);
+        let [output, other] = [(); 2].map(|()| image(driver.gpu(), FLOAT4, 16, SIZE, ATTACHED));
         let most = driver.gpu().info.image_size;
         for origin in [[most - 5, 0], [0, u32::MAX]] {
             let said = frame(driver, &case, &new(&case, &output).origin(origin)).expect_err("refused");
             assert!(said.contains(&format!("origin is {origin:?}")), "{said}");
-            let scene = SceneInput::new((output.view, READ), (output.view, READ), 1.0).origin(origin);
+            let scene = SceneInput::new((other.view, READ), (other.view, READ), 1.0).origin(origin);
             let said = frame(driver, &case, &new(&case, &output).scene(scene)).expect_err("refused");
             assert!(said.contains(&format!("origin of the scene is {origin:?}")), "{said}");
         }

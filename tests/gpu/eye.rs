@@ -69,9 +69,7 @@ fn the_device_decides_as_the_cpu() {
             let strays = [Vec3::NAN, Vec3::INFINITY, Vec3::new(0.0, f32::NEG_INFINITY, 0.0)];
             let all: Vec<Vec3> = positions.iter().chain(&strays).copied().collect();
             let upload = Upload::new(driver.gpu(), bytemuck::cast_slice(&all)).expect("upload");
-            for (search, ellipsoids) in
-                [(Search::Runs, Fit::InPlace), (Search::Relation, Fit::InPlace), (Search::Relation, Fit::YuTurk)]
-            {
+            for (search, ellipsoids) in [(Search::Runs, Fit::InPlace), (Search::Relation, Fit::YuTurk)] {
                 let options = Options { search, ellipsoids, ..Options::default() };
                 let field = DensityField::new(positions, *radius, &options).expect("sorted");
                 for (eye, target) in eyes(&mut random, positions, *radius) {
