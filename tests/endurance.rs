@@ -42,7 +42,7 @@ const PLAIN: Kind = Kind {
 /// Lavapipe of Mesa 22.3 makes constants of uniforms that a branch hangs on alone, and does so in every frame where that changes
 /// a shader's size enough; how much is enough differs from shader to shader. Of what can be planted, only a loop in the shader
 /// of the second kind has been seen to be compiled anew (tests/mutants.txt); the other kinds are there for what other drivers do.
-const KINDS: [Kind; 16] = [
+const KINDS: [Kind; 17] = [
     Kind { name: "one refraction", refractions: 1, ..PLAIN },
     Kind { name: "one refraction, debug", refractions: 1, debug: true, ..PLAIN },
     Kind { name: "two refractions", refractions: 2, ..PLAIN },
@@ -53,6 +53,7 @@ const KINDS: [Kind; 16] = [
     Kind { name: "scene, debug, eye inside", scene: true, debug: true, inside: true, ..PLAIN },
     Kind { name: "two refractions, debug", refractions: 2, debug: true, ..PLAIN },
     Kind { name: "prepared on the device", on_device: true, ..PLAIN },
+    Kind { name: "a field, prepared on the device", method: "field", on_device: true, ..PLAIN },
     Kind { name: "imai14", method: "imai14", ..PLAIN },
     Kind { name: "cords08", method: "cords08", ..PLAIN },
     Kind { name: "green10 before a scene", method: "green10", scene: true, ..PLAIN },
@@ -205,4 +206,51 @@ fn run(gpu: &Gpu, kind: &Kind) -> Endured {
     // The tenth percentile: a busy machine makes most frames slow, compiling makes all of them so.
     let (slowest, place) = times[WATCHED / 10];
     Endured { process, held, slowest, pass: plan[place].name.clone() }
+}
+
+/// A window's day: ten thousand frames of liquid that moves, five hundred of them after a size that nobody foresees.
+#[test]
+#[ignore = "takes minutes: cargo test --test endurance -- --ignored"]
+fn ten_thousand_frames_of_five_hundred_sizes() {
+    let devices = Instance::new(false).and_then(|i| i.devices()).expect("a Vulkan loader");
+    for device in devices.into_iter().filter(|d| d.refusal.is_none()) {
+        let instance = Instance::new(false).expect("instance");
+        let gpu = Gpu::new(&instance, instance.pick(Some(&device.label())).expect("it was there")).expect("device");
+        let grey = Equirect::new(2, 1, &[[0.5; 3]; 2]).expect("a map");
+        let mut session = Session::new(&gpu, [64, 48], &grey).expect("session");
+        let (radius, settings) = (0.05, Settings::default());
+        let positions = liquid(radius);
+        let uploads = [0.0, 0.01].map(|x| {
+            let moved: Vec<Vec3> = positions.iter().map(|p| *p + x * Vec3::X).collect();
+            Upload::new(&gpu, bytemuck::cast_slice(&moved)).expect("upload")
+        });
+        let mut state = 7_u32;
+        let mut random = |most: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            1 + (state >> 16) % most
+        };
+        let (mut before, mut held, mut resized) = (0.0, 0, 0);
+        let (frames, warm) = (10_000, 2_000);
+        for frame in 0..frames {
+            if random(20) == 1 {
+                session.resize([random(96), random(72)]).expect("a size");
+                resized += 1;
+            }
+            if frame == warm {
+                session.resize([96, 72]).expect("a size");
+                (before, held) = (resident(), HELD.load(Ordering::Relaxed));
+            }
+            let eye = Vec3::new((0.01 * frame as f32).sin(), 0.2, 2.0);
+            let camera = Camera::look_at(eye, Vec3::ZERO, Vec3::Y, 0.7, 4.0 / 3.0, 0.01);
+            let given = DevicePositions::packed(uploads[frame % 2].buffer, positions.len() as u32, radius);
+            let input = FrameInput::new(0, &camera, &settings, ash::vk::ImageView::null()).positions(given);
+            session.frame(&input).expect("frame");
+        }
+        session.resize([96, 72]).expect("a size");
+        let held = HELD.load(Ordering::Relaxed) - held;
+        let process = (resident() - before) / (frames - warm) as f64;
+        println!("{}: {resized} sizes, {process:.0} bytes a frame, {held} bytes held by Rust", device.driver);
+        assert!(resized > 400 && process < 10e3 && held < 100_000, "{}: {process}, {held}", device.driver);
+        session.end();
+    }
 }
