@@ -6,6 +6,7 @@
 layout(local_size_x = PARTICLE_GROUP) in;
 #include "positions.glsl"
 #include "runs.glsl"
+#include "spline.glsl"
 layout(set = 0, binding = 0, std430) buffer FrameBlock { Frame frame; };
 
 // Sorted cells are as wide as the support: 3 x 3 runs of 3 cells hold all particles within it. One run of the relation table does.
@@ -13,11 +14,7 @@ const uint RUNS = RELATION_TABLE ? 1u : 9u;
 shared uvec2 runs[9];
 shared float sums[PARTICLE_GROUP];
 
-// The cubic spline: 2 (1 - q)^3 less 8 (1/2 - q)^3 where those are positive.
-float spline(float q) {
-    float far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
-    return 2.0 * far * far * far - 8.0 * near * near * near;
-}
+SPLINE(float)
 
 void main() {
     uint t = gl_LocalInvocationIndex;

@@ -18,6 +18,7 @@
 layout(local_size_x = PARTICLE_GROUP) in;
 #include "positions.glsl"
 #include "runs.glsl"
+#include "spline.glsl"
 #ifdef POINTS
 // Positions; w: their number density as a part of a filled body's, negative for a splash, 0 where there is nothing.
 layout(set = 0, binding = 12, std430) writeonly buffer PointBlock { vec4 at[]; } points;
@@ -79,11 +80,7 @@ bool nearer(vec3 a, vec3 b) {
     return large + small < 0.0;
 }
 
-// The cubic spline without a branch: 2 (1 - q)^3 less 8 (1/2 - q)^3 where those are positive.
-EACH spline(EACH q) {
-    EACH far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
-    return 2.0 * far * far * far - 8.0 * near * near * near;
-}
+SPLINE(EACH)
 
 #ifndef POINTS
 // Eigenvalues and eigenvectors (columns) of a symmetric matrix, in no order: cyclic Jacobi rotations.

@@ -136,7 +136,7 @@ pub(crate) fn name(properties: &vk::PhysicalDeviceProperties) -> String {
 }
 
 /// Bytes of the largest device-local heap.
-pub(crate) fn largest_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
+fn largest_heap(memory: &vk::PhysicalDeviceMemoryProperties) -> u64 {
     let local = memory.memory_heaps_as_slice().iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
     local.map(|h| h.size).max().unwrap_or(0)
 }

@@ -108,25 +108,30 @@ fn liquid(radius: f32) -> Vec<Vec3> {
     lattice.filter(|p| p.length() < 11.0 * radius).chain([Vec3::new(14.0 * radius, 0.0, 0.0)]).collect()
 }
 
-#[test]
-#[cfg_attr(not(target_os = "linux"), ignore = "reads /proc")]
-fn memory_and_time_stay_flat() {
+/// Each usable device in turn, by an instance of its own, without validation, which keeps books of its own.
+fn each_device(test: impl Fn(&Gpu)) {
     let devices = Instance::new(false).and_then(|i| i.devices()).expect("a Vulkan loader");
     let usable: Vec<_> = devices.into_iter().filter(|d| d.refusal.is_none()).collect();
     assert!(!usable.is_empty(), "no usable Vulkan device: run ./setup.sh");
     for device in usable {
-        // Without validation, which keeps books of its own.
         let instance = Instance::new(false).expect("instance");
-        let gpu = Gpu::new(&instance, instance.pick(Some(&device.label())).expect("it was there")).expect("device");
+        test(&Gpu::new(&instance, instance.pick(Some(&device.label())).expect("it was there")).expect("device"));
+    }
+}
+
+#[test]
+#[cfg_attr(not(target_os = "linux"), ignore = "reads /proc")]
+fn memory_and_time_stay_flat() {
+    each_device(|gpu| {
         for kind in &KINDS {
-            let label = format!("{}: {}", device.driver, kind.name);
-            let Endured { process, held, slowest, pass } = run(&gpu, kind);
+            let label = format!("{}: {}", gpu.info.driver, kind.name);
+            let Endured { process, held, slowest, pass } = run(gpu, kind);
             println!("{label}: {:.1} kB a frame, {held} bytes of it Rust's; {pass} {slowest:.2} ms", process / 1e3);
             assert!(process <= GROWTH, "{label}: {process} bytes a frame");
             assert_eq!(held, 0, "{label}: bytes that the library does not give back");
             assert!(slowest <= SLOWEST, "{label}: {pass} takes {slowest} ms");
         }
-    }
+    });
 }
 
 /// What the watched frames cost.
@@ -212,17 +217,14 @@ fn run(gpu: &Gpu, kind: &Kind) -> Endured {
 #[test]
 #[ignore = "takes minutes: cargo test --test endurance -- --ignored"]
 fn ten_thousand_frames_of_five_hundred_sizes() {
-    let devices = Instance::new(false).and_then(|i| i.devices()).expect("a Vulkan loader");
-    for device in devices.into_iter().filter(|d| d.refusal.is_none()) {
-        let instance = Instance::new(false).expect("instance");
-        let gpu = Gpu::new(&instance, instance.pick(Some(&device.label())).expect("it was there")).expect("device");
+    each_device(|gpu| {
         let grey = Equirect::new(2, 1, &[[0.5; 3]; 2]).expect("a map");
-        let mut session = Session::new(&gpu, [64, 48], &grey).expect("session");
+        let mut session = Session::new(gpu, [64, 48], &grey).expect("session");
         let (radius, settings) = (0.05, Settings::default());
         let positions = liquid(radius);
         let uploads = [0.0, 0.01].map(|x| {
             let moved: Vec<Vec3> = positions.iter().map(|p| *p + x * Vec3::X).collect();
-            Upload::new(&gpu, bytemuck::cast_slice(&moved)).expect("upload")
+            Upload::new(gpu, bytemuck::cast_slice(&moved)).expect("upload")
         });
         let mut state = 7_u32;
         let mut random = |most: u32| {
@@ -249,8 +251,8 @@ fn ten_thousand_frames_of_five_hundred_sizes() {
         session.resize([96, 72]).expect("a size");
         let held = HELD.load(Ordering::Relaxed) - held;
         let process = (resident() - before) / (frames - warm) as f64;
-        println!("{}: {resized} sizes, {process:.0} bytes a frame, {held} bytes held by Rust", device.driver);
-        assert!(resized > 400 && process < 10e3 && held < 100_000, "{}: {process}, {held}", device.driver);
+        println!("{}: {resized} sizes, {process:.0} bytes a frame, {held} bytes held by Rust", gpu.info.driver);
+        assert!(resized > 400 && process < 10e3 && held < 100_000, "{}: {process}, {held}", gpu.info.driver);
         session.end();
-    }
+    });
 }

@@ -255,7 +255,7 @@ impl Instance {
     fn describe(&self, handle: vk::PhysicalDevice) -> DeviceInfo {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         // SAFETY: the physical device is this instance's; the chain lives on this stack frame.
-        let (properties, features, families, memory) = unsafe {
+        let (properties, features, families) = unsafe {
             let properties = self.handle.get_physical_device_properties(handle);
             if properties.api_version >= vk::API_VERSION_1_2 {
                 let mut properties2 = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
@@ -263,7 +263,7 @@ impl Instance {
             }
             let features = self.handle.get_physical_device_features(handle);
             let families = self.handle.get_physical_device_queue_family_properties(handle);
-            (properties, features, families, self.handle.get_physical_device_memory_properties(handle))
+            (properties, features, families)
         };
         let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         let family = families.iter().position(|f| f.queue_flags.contains(wanted)).unwrap_or(0) as u32;
@@ -275,6 +275,8 @@ impl Instance {
             vk::PhysicalDeviceType::CPU => (4, "CPU"),
             _ => (5, "other"),
         };
+        let large_points = features.large_points != 0;
+        let limits = Limits::of(&self.handle, handle, family, large_points);
         let text = |s: Result<&CStr, _>| s.map(|s: &CStr| s.to_string_lossy().into_owned()).unwrap_or_default();
         let v = properties.api_version;
         DeviceInfo {
@@ -287,14 +289,14 @@ impl Instance {
             refusal: device::check(&self.handle, handle, family).err().map(|e| e.to_string()),
             point_size: properties.limits.point_size_range[1],
             image_size: properties.limits.max_image_dimension2_d,
-            memory: device::largest_heap(&memory),
-            timestamps: families.get(family as usize).is_some_and(|f| f.timestamp_valid_bits > 0),
-            large_points: features.large_points != 0,
+            memory: limits.memory,
+            timestamps: limits.timestamp_period.is_some(),
+            large_points,
             slowed_by: self.tools(handle, properties.api_version),
             rank,
             handle,
             family,
-            limits: Limits::of(&self.handle, handle, family, features.large_points != 0),
+            limits,
         }
     }
 

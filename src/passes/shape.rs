@@ -70,9 +70,9 @@ fn dispatch(
     let count = u64::from(scene.count);
     let listed = preparation.neighbours > 0;
     let by_id = preparation.kept.is_some_and(|kept| kept.by_id);
-    let variant = usize::from(listed) + 2 * usize::from(preparation.kept.is_some()) + 4 * usize::from(points);
-    let alone = !scene.four;
-    let variant = variant + 8 * usize::from(alone);
+    let (alone, at_once) = if scene.four { (false, SHAPE_RUN) } else { (true, 1) };
+    let variants = [listed, preparation.kept.is_some(), points, alone];
+    let variant: usize = variants.into_iter().enumerate().map(|(bit, is)| usize::from(is) << bit).sum();
     let mut call = write(Call::compute(&SHAPE_COMP[variant]))
         .read("extent", extent)
         .read("order", sorted.order)
@@ -91,5 +91,5 @@ fn dispatch(
         let lists = plan.array("neighbours (debug)", 4 * (2 + u64::from(preparation.neighbours)) * count);
         call = call.write("neighbours", lists);
     }
-    plan.dispatch("shape", call, rectangle(scene.count.div_ceil(if alone { 1 } else { SHAPE_RUN } * PARTICLE_GROUP)));
+    plan.dispatch("shape", call, rectangle(scene.count.div_ceil(at_once * PARTICLE_GROUP)));
 }

@@ -2,31 +2,7 @@
  *
  *     allocator PART-OF-A-DRIVER'S-NAME
  */
-#include <meniscus.h>
-
-enum { WIDTH = 96, HEIGHT = 64, PARTICLES = 9 * 9 * 9 };
-#include "../../examples/headless.h"
-
-static int checks, failed;
-
-static void is_true(int line, int value, const char *what) {
-    char text[1024] = "";
-    meniscus_last_message(text, sizeof text);
-    checks++;
-    if (!value) {
-        failed++;
-        printf("line %d: not %s; last \"%s\"\n", line, what, text);
-    }
-}
-#define TRUE(value) is_true(__LINE__, value, #value)
-#define OK(call) TRUE((call) == MENISCUS_STATUS_OK)
-
-/* Whether a call said this. */
-static int says(MeniscusStatus status, MeniscusStatus wanted, const char *words) {
-    char text[1024] = "";
-    meniscus_last_message(text, sizeof text);
-    return status == wanted && strstr(text, words) != NULL;
-}
+#include "checks.h"
 
 /* The plainest allocator: each piece is an allocation of its own. */
 typedef struct {
@@ -62,18 +38,6 @@ static void give_back(void *user_data, const MeniscusAllocation *allocation) {
     plain->alive--;
 }
 
-static void begin(VkCommandBuffer cmd) {
-    const VkCommandBufferBeginInfo info = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-    VK(vkBeginCommandBuffer(cmd, &info));
-}
-
-static void submit(const Vulkan *vk, VkCommandBuffer cmd) {
-    VK(vkEndCommandBuffer(cmd));
-    const VkSubmitInfo info = {.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO, .commandBufferCount = 1, .pCommandBuffers = &cmd};
-    VK(vkQueueSubmit(vk->queue, 1, &info, VK_NULL_HANDLE));
-    VK(vkDeviceWaitIdle(vk->device));
-}
-
 /* A frame by a renderer of this host's, which ends with it; what recording it said. */
 static MeniscusStatus draw(const Vulkan *vk, const MeniscusHost *host, const MeniscusSettings *settings, const Buffer *at,
                            unsigned char *pixels) {
@@ -97,7 +61,7 @@ static MeniscusStatus draw(const Vulkan *vk, const MeniscusHost *host, const Men
     MeniscusRenderer *renderer;
     OK(meniscus_renderer_create(host, VK_FORMAT_R8G8B8A8_UNORM, &renderer));
     OK(meniscus_renderer_resize(renderer, WIDTH, HEIGHT));
-    begin(cmd);
+    begin(vk, cmd);
     OK(meniscus_renderer_set_environment(renderer, cmd, 2, 1, map[0]));
     layout(cmd, &picture, VK_IMAGE_LAYOUT_UNDEFINED, drawn);
     const MeniscusStatus status = meniscus_renderer_record(renderer, cmd, &frame);
@@ -133,10 +97,7 @@ int main(int argc, char **argv) {
     MeniscusSettings *settings;
     OK(meniscus_settings_create(&settings));
     const Buffer at = make_buffer(&vk, 12 * PARTICLES, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
-    for (int i = 0; i < PARTICLES; i++) {
-        const float place[3] = {0.2f * (float)(i % 9 - 4), 0.2f * (float)(i / 9 % 9 - 4), 0.2f * (float)(i / 81 - 4)};
-        memcpy((char *)at.bytes + 12 * i, place, sizeof place);
-    }
+    lattice((float(*)[3])at.bytes, 0.1f);
 
     /* The same picture as with the renderer's own, and all of it comes back. */
     OK(draw(&vk, &host, settings, &at, pictures[0]));
@@ -152,23 +113,22 @@ int main(int argc, char **argv) {
     /* Where there is no more, at the first time and in the frame, that is said, and what there was comes back. */
     MeniscusRenderer *renderer;
     plain = (Plain){.vk = &vk, .most = 0};
-    TRUE(says(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), MENISCUS_STATUS_ERROR_MEMORY, "bytes of device memory"));
+    MEMORY(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), "bytes of device memory");
     TRUE(renderer == NULL && plain.asked == 1 && plain.alive == 0);
     plain = (Plain){.vk = &vk, .most = asked - 1};
     TRUE(draw(&vk, &host, settings, &at, pictures[1]) == MENISCUS_STATUS_ERROR_MEMORY);
     TRUE(plain.asked == asked && plain.alive == 0);
     plain = (Plain){.vk = &vk, .most = -1, .forgets = 1};
-    TRUE(says(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), MENISCUS_STATUS_ERROR_MEMORY, "not mapped"));
+    MEMORY(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), "not mapped");
     TRUE(plain.alive == 0);
 
     /* What is no allocator. */
-    const MeniscusStatus argument = MENISCUS_STATUS_ERROR_ARGUMENT;
     allocator.free = NULL;
-    TRUE(says(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), argument, "MeniscusAllocator::free is null"));
+    ARGUMENT(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), "MeniscusAllocator::free is null");
     allocator.allocate = NULL;
-    TRUE(says(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), argument, "MeniscusAllocator::allocate is null"));
+    ARGUMENT(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), "MeniscusAllocator::allocate is null");
     allocator.struct_size = 8;
-    TRUE(says(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), argument, "struct_size of MeniscusAllocator is 8"));
+    ARGUMENT(meniscus_renderer_create(&host, VK_FORMAT_R8G8B8A8_UNORM, &renderer), "struct_size of MeniscusAllocator is 8");
 
     destroy_buffer(&vk, &at);
     OK(meniscus_settings_destroy(settings));

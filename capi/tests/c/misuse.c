@@ -4,42 +4,7 @@
  *     misuse PART-OF-A-DRIVER'S-NAME
  */
 #include <math.h>
-#include <meniscus.h>
-
-enum { WIDTH = 96, HEIGHT = 64, PARTICLES = 9 * 9 * 9 };
-#include "../../examples/headless.h"
-
-static int checks, failed;
-
-/* The call's status, and a part of its message; "" where it went well. */
-static void expect(int line, MeniscusStatus status, MeniscusStatus wanted, const char *said) {
-    char text[2048] = "";
-    if (status != MENISCUS_STATUS_OK) {
-        meniscus_last_message(text, sizeof text);
-    }
-    checks++;
-    if (status != wanted || !strstr(text, said)) {
-        failed++;
-        printf("line %d: %s, \"%s\"; wanted %s, \"%s\"\n", line, meniscus_status_name(status), text, meniscus_status_name(wanted),
-               said);
-    }
-}
-
-static void is_true(int line, int value, const char *what) {
-    checks++;
-    if (!value) {
-        failed++;
-        printf("line %d: not %s\n", line, what);
-    }
-}
-
-#define OK(call) expect(__LINE__, call, MENISCUS_STATUS_OK, "")
-#define ARGUMENT(call, said) expect(__LINE__, call, MENISCUS_STATUS_ERROR_ARGUMENT, said)
-#define PARAMETER(call, said) expect(__LINE__, call, MENISCUS_STATUS_ERROR_PARAMETER, said)
-#define ORDER(call, said) expect(__LINE__, call, MENISCUS_STATUS_ERROR_ORDER, said)
-#define UNSUPPORTED(call, said) expect(__LINE__, call, MENISCUS_STATUS_ERROR_UNSUPPORTED, said)
-#define NOT_READY(call, said) expect(__LINE__, call, MENISCUS_STATUS_NOT_READY, said)
-#define TRUE(value) is_true(__LINE__, value, #value)
+#include "checks.h"
 
 static void names(MeniscusSettings *settings) {
     char text[16];
@@ -87,15 +52,6 @@ static void names(MeniscusSettings *settings) {
     TRUE(strcmp(text, "1.333") == 0);
     OK(meniscus_settings_destroy(copy));
     OK(meniscus_settings_destroy(NULL));
-}
-
-static void lattice(float (*at)[3], float radius) {
-    for (int i = 0; i < PARTICLES; i++) {
-        const int whole[3] = {i % 9 - 4, i / 9 % 9 - 4, i / 81 - 4};
-        for (int k = 0; k < 3; k++) {
-            at[i][k] = 2.0f * radius * (float)whole[k];
-        }
-    }
 }
 
 static void particles(MeniscusRenderer *renderer, const MeniscusSettings *settings) {
@@ -198,19 +154,6 @@ static void hosts(const Vulkan *vk, const MeniscusHost *good) {
     ARGUMENT(meniscus_required_features(NULL), "null");
     ARGUMENT(meniscus_renderer_resize(NULL, 1, 1), "renderer is null");
     OK(meniscus_renderer_destroy(NULL));
-}
-
-static void begin(const Vulkan *vk, VkCommandBuffer cmd) {
-    const VkCommandBufferBeginInfo info = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO};
-    VK(vkDeviceWaitIdle(vk->device));
-    VK(vkBeginCommandBuffer(cmd, &info));
-}
-
-static void submit(const Vulkan *vk, VkCommandBuffer cmd) {
-    VK(vkEndCommandBuffer(cmd));
-    const VkSubmitInfo info = {.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO, .commandBufferCount = 1, .pCommandBuffers = &cmd};
-    VK(vkQueueSubmit(vk->queue, 1, &info, VK_NULL_HANDLE));
-    VK(vkDeviceWaitIdle(vk->device));
 }
 
 /* The faster of two methods follows when the first takes too long. */
