@@ -20,7 +20,7 @@ layout(local_size_x = PARTICLE_GROUP) in;
 #include "runs.glsl"
 #include "spline.glsl"
 #ifdef POINTS
-// Positions; w: their number density as a part of a filled body's, negative for a splash, 0 where there is nothing.
+// Positions; w: their number density as a part of a filled body's, negative for balls, 0 where there is nothing.
 layout(set = 0, binding = 12, std430) writeonly buffer PointBlock { vec4 at[]; } points;
 #else
 layout(set = 0, binding = 5, std430) writeonly buffer CenterBlock { float at[]; } centers;
@@ -256,7 +256,7 @@ void finish(uint k, vec3 x, Sums s, uint b) {
     float relative = float(OF(s.density, b)) / (DENSITY_ONE * prepare.filled_density);
     bool body = classify(k, relative);
     note(body ? BODY : SPLASH);
-    points.at[k] = vec4(x, body ? relative : -relative);
+    points.at[k] = vec4(x, body || relative >= FIELD_JOINS ? relative : -relative);
 }
 #else
 // Class and ellipsoid of particle k at x from its sums, those of component b.

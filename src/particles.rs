@@ -1,5 +1,6 @@
 //! Particles as they are drawn.
 
+use crate::shader::FIELD_JOINS;
 use glam::{DVec3, Mat3, Vec3};
 
 /// Which of the two kinds of liquid a particle belongs to (Imai16 §4.1).
@@ -29,8 +30,20 @@ pub struct Point {
     pub position: Vec3,
     /// Its number density, as a part of a filled body's.
     pub density: f32,
-    /// A splash is a ball beside the field.
+    /// A splash that reaches no other is a ball beside the field.
     pub class: Class,
+}
+
+impl Point {
+    /// Whether it is a ball beside the field, and adds nothing to it.
+    pub fn is_ball(&self) -> bool {
+        self.class == Class::Splash && self.density < FIELD_JOINS
+    }
+
+    /// Its density as the device has it: negative for a ball.
+    pub fn signed_density(&self) -> f32 {
+        if self.is_ball() { -self.density } else { self.density }
+    }
 }
 
 /// Everything a frame draws: splash particles first, then the body's, each in canonical order

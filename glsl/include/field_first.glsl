@@ -10,7 +10,8 @@ Wall first_wall(inout Block block, ivec2 pixel, vec3 x, vec3 dir, vec3 eye_dir, 
     uvec2 bounds = tiles.at[(pixel.y / FIELD_TILE) * ((int(frame.size.x) + FIELD_TILE - 1) / FIELD_TILE) + pixel.x / FIELD_TILE];
     float per_depth = 1.0 / (-eye_dir.z * push.spacing);
     vec2 range = vec2((uintBitsToFloat(bounds.x) - frame.near) * per_depth, (uintBitsToFloat(INFINITE - bounds.y) - frame.near) * per_depth);
-    if (bounds.x == INFINITE) range = vec2(NONE, 0.0);
+    // An invocation beside the tile has nothing to look for, and drivers on CPUs may give it no bounds, and wait for it.
+    if (bounds.x == INFINITE || gl_HelperInvocation) range = vec2(NONE, 0.0);
     stopped = false;
     // The near plane may lie in the liquid.
     for (bool look = range.x <= 0.0 && range.y >= 0.0; look; look = false) {

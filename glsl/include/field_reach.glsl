@@ -29,4 +29,7 @@ bool reaches(Reach r, ivec3 brick) {
 }
 
 // What a particle of the body adds where its kernel is 1, in whole numbers of a node.
-float unit_of(vec4 point) { return build.unit / max(min(point.w, FIELD_DENSEST), FIELD_CROWD * point.w); }
+float unit_of(vec4 point) {
+    float rim = max(FIELD_RIM - FIELD_THINNED * (FIELD_RIM - point.w), FIELD_THIN);
+    return build.unit / max(min(min(point.w, rim), FIELD_DENSEST), FIELD_CROWD * point.w);
+}

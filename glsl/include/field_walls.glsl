@@ -12,8 +12,9 @@ layout(set = 0, binding = 5, std430) readonly buffer CellBlock { uvec4 at[]; } c
 layout(set = 0, binding = 13) uniform utextureBuffer table_texels;
 layout(set = 0, binding = 14) uniform utextureBuffer record_texels;
 layout(set = 0, binding = 15) uniform utextureBuffer cell_texels;
+layout(set = 0, binding = 16) uniform utextureBuffer ball_texels;
 layout(constant_id = 6) const bool TEXELS = false;
-layout(set = 0, binding = 12, std430) readonly buffer BallBlock { uvec2 at[]; } balls;
+layout(set = 0, binding = 12, std430) readonly buffer BallBlock { uvec4 at[]; } balls; // two in each
 uvec4 directory_texel(uint i) {
     if (TEXELS) return texelFetch(table_texels, int(i));
     return table.at[i];
@@ -25,6 +26,13 @@ uvec4 record_texel(uint i) {
 uvec4 cell_texel(uint i) {
     if (TEXELS) return texelFetch(cell_texels, int(i));
     return cells.at[i];
+}
+// The ball of an entry in a brick's list, from 1 on.
+uvec2 ball_entry(uint entry) {
+    uvec4 two;
+    if (TEXELS) two = texelFetch(ball_texels, int((entry - 1u) / 2u));
+    else two = balls.at[(entry - 1u) / 2u];
+    return (entry & 1u) != 0u ? two.xy : two.zw;
 }
 #include "field_directory.glsl"
 
@@ -115,7 +123,7 @@ bool ball_around(vec3 x, uint entry, out vec3 center) {
     vec3 brick = BRICK_EDGE * floor(x / BRICK_EDGE);
     uint least = none;
     for (uint i = 0u; i < FIELD_MOST_BALLS && entry != 0u; ++i) {
-        uvec2 ball = balls.at[entry - 1u];
+        uvec2 ball = ball_entry(entry);
         vec3 at = brick + field_ball(ball.x), q = x - at;
         if (ball.x < least && dot(q, q) < push.ball * push.ball * (1.0 - BALL_ROUNDING)) {
             least = ball.x;
@@ -158,17 +166,13 @@ bool falls(vec4 h, inout bool own, out float root) {
 // The nearest ball of a brick that a ray from outside meets before `wall`.
 void meet_balls(uint entry, vec3 brick, vec3 x, vec3 dir, inout Wall wall) {
     for (uint i = 0u; i < FIELD_MOST_BALLS && entry != 0u; ++i) {
-        uvec2 ball = balls.at[entry - 1u];
+        uvec2 ball = ball_entry(entry);
         vec3 center = brick + field_ball(ball.x);
         vec2 t;
         if (meets_ball(center, x, dir, t) && t.x > BALL_START && t.x < wall.t) wall = Wall(t.x, CLASS_SPLASH, center, 0u, 0u);
         entry = ball.y;
     }
 }
-
-// So many bricks of a block, or cells of a brick, a ray crosses at most, where places can tell one from the next. Liquid may be so wide
-// that they cannot: then steps run out, where a loop without an end would be the end of the device.
-const uint CROSSED = 3u * (uint(FIELD_BRICK) - 1u) + 1u;
 
 // A ray on its way through the lattice.
 struct Course {
@@ -179,14 +183,48 @@ struct Course {
     float t;
     vec3 cell;  // in which it is there: its first node
 };
-// Takes it out of a cube around its cell, by that one's first node and edge.
-void leave(inout Course c, vec3 low, float edge) {
-    vec3 border = (low + edge * c.ahead - c.x) * c.per_dir;
+
+// Takes it out of its cell.
+void leave(inout Course c) {
+    vec3 border = (c.cell + c.ahead - c.x) * c.per_dir;
     float out_of = min(border.x, min(border.y, border.z));
     c.t = max(c.t, out_of);
-    vec3 next = clamp(floor(c.x + c.t * c.dir), low, low + (edge - 1.0));
-    c.cell = mix(next, low + (edge + 1.0) * c.ahead - 1.0, equal(border, vec3(out_of)));
+    vec3 next = c.cell + 2.0 * c.ahead - 1.0;
+    c.cell = mix(c.cell, next, equal(border, vec3(out_of)));
 }
+
+// Places among 4 x 4 x 4 cubes, in a byte each, and what a step adds to them; whoever has left them has set one of these bits.
+const uint AXIS_Y = 1u << 8, AXIS_Z = 1u << 16, BEYOND_FOUR = 0xfcfcfcu, BEYOND_ONE = 0xffffffu;
+
+// Takes a ray from cube to cube of one edge, from its own on, until it comes to one of those that `stops` has, by its number k, or
+// leaves them all; they begin at `low`. `beyond`: whether they are 4 x 4 x 4, or the one that it is in. Says whether it came to one.
+// Each step goes up or down one axis as the ray does, so that there are few, whatever its numbers are.
+bool cross_cubes(inout Course c, bool go, vec3 low, float edge, uint beyond, uvec2 stops, out uint k, inout bool first) {
+    vec3 cube = edge * floor(c.cell / edge), sides = edge * (2.0 * c.ahead - 1.0);
+    vec3 next = (cube + edge * c.ahead - c.x) * c.per_dir, between = edge * abs(c.per_dir);
+    uvec3 up = uvec3(1u, AXIS_Y, AXIS_Z), ways = mix(0u - up, up, greaterThan(c.ahead, vec3(0.0)));
+    uint place = beyond == BEYOND_ONE ? 0u : uint(whole(dot((cube - low) / edge, vec3(1.0, float(AXIS_Y), float(AXIS_Z)))));
+    bool stop = false, moved = false;
+    while (go) {
+        k = (place | place >> 6 | place >> 12) & 63u;
+        stop = field_bit(stops, k);
+        if (!stop) {
+            bool is_x = next.x <= next.y && next.x <= next.z, is_y = !is_x && next.y <= next.z, is_z = !is_x && !is_y;
+            c.t = max(c.t, is_x ? next.x : is_y ? next.y : next.z);
+            place += is_x ? ways.x : is_y ? ways.y : ways.z;
+            cube += mix(vec3(0.0), sides, bvec3(is_x, is_y, is_z));
+            next += mix(vec3(0.0), between, bvec3(is_x, is_y, is_z));
+            moved = true;
+        }
+        go = !stop && (place & beyond) == 0u;
+    }
+    if (moved) {
+        c.cell = clamp(floor(c.x + c.t * c.dir), cube, cube + (edge - 1.0));
+        first = false;
+    }
+    return stop;
+}
+
 // The first wall that a ray meets from x on, from t to `reach`: of the field from within it, or from outside of all liquid of whichever
 // comes first. Without one its t is NONE, and `stopped` says whether steps ran out.
 Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float reach, out bool stopped) {
@@ -204,35 +242,16 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
             ++steps;
             look_up(block, c.cell);
             uvec2 stops = inside ? block.surfaces : block.surfaces | block.balls;
-            float edge = stops == uvec2(0u) ? BLOCK_EDGE : BRICK_EDGE, per_edge = 1.0 / edge;
-            bool stop = false, within = true;
-            vec3 brick = vec3(0.0);
-            uint k = 0u;
-            for (uint crossed = 0u; crossed < CROSSED && within && !stop; ++crossed) {
-                brick = edge * floor(c.cell * per_edge);
-                k = local_of((brick - block.low) / BRICK_EDGE);
-                stop = field_bit(stops, k);
-                if (!stop) {
-                    leave(c, brick, edge);
-                    within = is_in(c.cell, block.low, BLOCK_EDGE);
-                    first = false;
-                }
-            }
+            bool none = stops == uvec2(0u);
+            uint k;
+            bool stop = cross_cubes(c, true, block.low, none ? BLOCK_EDGE : BRICK_EDGE, none ? BEYOND_ONE : BEYOND_FOUR, stops, k, first);
             uvec4 words = stop ? brick_words(block.first + field_before(block.there, k)) : uvec4(0u);
             bool surface = stop && field_bit(block.surfaces, k);
-            uvec2 bits = words.xy;
             ball = words[FIELD_FIRST_BALL];
+            vec3 brick = BRICK_EDGE * floor(c.cell / BRICK_EDGE);
             meet_balls(inside ? 0u : ball, brick, x, dir, wall);
-            edge = surface ? 1.0 : BRICK_EDGE;
-            for (uint crossed = 0u; crossed < CROSSED && stop && !at_surface; ++crossed) {
-                k = local_of(c.cell - brick);
-                at_surface = field_bit(bits, k);
-                if (!at_surface) {
-                    leave(c, surface ? c.cell : brick, edge);
-                    stop = is_in(c.cell, brick, BRICK_EDGE);
-                    first = false;
-                }
-            }
+            uvec2 bits = surface ? words.xy : uvec2(0u);
+            at_surface = cross_cubes(c, stop, brick, surface ? 1.0 : BRICK_EDGE, surface ? BEYOND_FOUR : BEYOND_ONE, bits, k, first);
             if (at_surface) cell = words[FIELD_FIRST_CELL] + field_before(bits, k);
         }
         if (at_surface) {
@@ -252,7 +271,7 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
                 root = 0.0;
             }
             first = false;
-            leave(c, place, 1.0);
+            leave(c);
             if (met) c.t = mix(begin, end, root);
             if (met && c.t < min(reach, wall.t)) wall = Wall(c.t, CLASS_BODY, place, cell, ball);
         }

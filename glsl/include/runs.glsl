@@ -1,9 +1,9 @@
 // Particles in the sorted order (sort.comp), and the runs of it that hold all of them in some cells. Whoever includes this has
 // positions.glsl before it.
 layout(set = 0, binding = 3, std430) readonly buffer OrderBlock { uint at[]; } order;
-layout(set = 0, binding = 4, std430) readonly buffer SortedBlock { float at[]; } sorted;
+layout(set = 0, binding = 4, std430) readonly buffer SortedBlock { vec4 at[]; } sorted;
 
-vec3 sorted_position(uint k) { return vec3(sorted.at[3u * k], sorted.at[3u * k + 1u], sorted.at[3u * k + 2u]); }
+vec3 sorted_position(uint k) { return sorted.at[k].xyz; }
 uint entry_at(uint rank) { // the sort's result
     uint passes = extent.at[EXTENT_PASSES];
     return passes == 0u ? rank : order.at[half_before(passes) + rank];

@@ -279,8 +279,18 @@ struct Prepare {
 // unless that is less than this part of its own: crowds, whose sum would outgrow a node (2 in a body however dense, and 4.8
 // around particles on one spot under the narrowest kernel; a node has room for 8).
 #define FIELD_CROWD 0.5
-// From this number density on, as a part of a filled body's, the field encloses a particle of the body.
+// Splashes from this number density on, as a part of a filled body's, belong to the field as the body does: pairs and rows in reach of each other.
+#define FIELD_JOINS 0.4
+// Below the number density FIELD_RIM particles lie at the edge of a sheet. They count as less dense than they are, down to FIELD_THIN: the
+// surface would draw back there.
+#define FIELD_RIM 0.65
+#define FIELD_THIN 0.45
+#define FIELD_THINNED 3.0
+// From the number density FIELD_SURE on the field encloses a particle of the body. Below FIELD_TIP, at corners and ends of threads, it has to go on
+// beyond the particle for FIELD_BEYOND radii.
 #define FIELD_SURE 0.9
+#define FIELD_TIP 0.52
+#define FIELD_BEYOND 0.6
 // The most that one particle adds to a node: below it whatever density the host says.
 #define FIELD_MOST_SHARE 32767.0
 // What the box of a dense grid's bricks is without any.

@@ -1,10 +1,12 @@
 // The density field as bricks of nodes, where there is any (docs/methods.md, "Density field"). MARK enters the bricks that points reach
 // in the directory, block by block, NUMBER numbers them, SCATTER adds each point's share to the nodes that it reaches, as whole numbers, whose
-// sum does not hang on the order, and lists the balls in each brick; BALLS lists them alone, where something else adds the shares
-// (dense_grid.comp); STRAY makes balls, too, of the body's particles that the field does not enclose; FINISH finds the cells that hold
-// the surface, and puts together what a walk looks at in them.
+// sum does not hang on the order; LIST lists the balls in each brick: splashes, and those of the body's particles that the field does not
+// enclose; FINISH finds the cells that hold the surface, and puts together what a walk looks at in them.
+//
+// Drivers on CPUs may run a branch for all invocations that go together, even where none takes it, but a loop only while one goes on:
+// what few need is in loops here that go round once at most.
 #version 460
-// Compiled with one of: MARK, NUMBER, SCATTER, BALLS, STRAY, FINISH
+// Compiled with one of: MARK, NUMBER, SCATTER, LIST, FINISH
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"
@@ -12,12 +14,16 @@
 #include "field.glsl"
 layout(local_size_x = PARTICLE_GROUP) in;
 layout(push_constant) uniform PushBlock { FieldBuild build; };
-#ifdef FINISH
+#if defined(SCATTER) || defined(FINISH)
 layout(set = 0, binding = 1, std430) readonly buffer HeadBlock { FieldHead head; };
 #elif !defined(MARK)
 layout(set = 0, binding = 1, std430) buffer HeadBlock { FieldHead head; };
 #endif
+#ifdef SCATTER
+layout(set = 0, binding = 2, std430) readonly buffer TableBlock { uint at[]; } table;
+#else
 layout(set = 0, binding = 2, std430) buffer TableBlock { uint at[]; } table;
+#endif
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 layout(constant_id = 0) const uint COUNTERS = 0; // slot of its first counter
 const uint BRICKS = 0u, CELLS = 1u, BRICKS_LEFT_OUT = 2u, CELLS_LEFT_OUT = 3u, BALLS_LEFT_OUT = 4u;
@@ -25,10 +31,10 @@ const uint BRICKS = 0u, CELLS = 1u, BRICKS_LEFT_OUT = 2u, CELLS_LEFT_OUT = 3u, B
 // Positions; w: their number density as a part of a filled body's, negative for balls, 0 where there is nothing.
 layout(set = 0, binding = 3, std430) readonly buffer PointBlock { vec4 at[]; } points;
 #endif
-#ifndef MARK
+#if !defined(MARK) && !defined(SCATTER)
 layout(set = 0, binding = 6, std430) buffer RecordBlock { uint at[]; } records;
 #endif
-#if defined(SCATTER) || defined(STRAY) || defined(FINISH)
+#if defined(SCATTER) || defined(LIST) || defined(FINISH)
 layout(set = 0, binding = 7, std430) buffer NodeBlock { uint at[]; } nodes;
 #endif
 
@@ -42,12 +48,6 @@ layout(constant_id = 1) const bool ORIGIN_ON_DEVICE = false; // the liquid's own
 
 // The k-th of eight blocks that its bricks can be in.
 ivec3 block_of(Reach r, uint k) { return field_brick(r.first) + ivec3(k & 1u, (k >> 1) & 1u, k >> 2); }
-
-// Its first and last brick in a block; none where one coordinate of the last is smaller.
-void bricks_in(Reach r, ivec3 block, out ivec3 first, out ivec3 last) {
-    first = max(r.first, block << FIELD_BRICK_BITS);
-    last = min(r.last, (block << FIELD_BRICK_BITS) + FIELD_BRICK - 1);
-}
 #endif
 
 uvec4 directory_texel(uint i) { return uvec4(table.at[4u * i], table.at[4u * i + 1u], table.at[4u * i + 2u], table.at[4u * i + 3u]); }
@@ -87,23 +87,40 @@ void enter(ivec3 block, ivec3 base, uvec2 bits, uint name) {
     if (!done) atomicAdd(counters.at[COUNTERS + BRICKS_LEFT_OUT], uint(bitCount(bits.x) + bitCount(bits.y)));
 }
 
+// How far three bricks along an axis lie from a point, squared; beyond the last one that it reaches infinitely far.
+vec3 distances(Reach r, int axis) {
+    vec3 low = float((r.first[axis] << FIELD_BRICK_BITS) - r.node[axis]) - r.part[axis] + float(FIELD_BRICK) * vec3(0.0, 1.0, 2.0);
+    vec3 across = max(max(low, -low - float(FIELD_BRICK)), 0.0);
+    return mix(across * across, vec3(1e30), greaterThan(ivec3(0, 1, 2), ivec3(r.last[axis] - r.first[axis])));
+}
+
 void main() {
     uint i = invocation();
     if (i >= build.count || points.at[i].w == 0.0) return;
     Reach r = reach_of(points.at[i]);
     vec3 part;
-    ivec3 base = block_of_node(origin_node(part));
-    for (uint k = 0u; k < 8u; ++k) {
-        ivec3 block = block_of(r, k), first, last;
-        bricks_in(r, block, first, last);
-        uvec2 bits = uvec2(0u);
-        for (int z = first.z; z <= last.z; ++z)
-            for (int y = first.y; y <= last.y; ++y)
-                for (int x = first.x; x <= last.x; ++x) {
-                    uint local = field_local(ivec3(x, y, z)), bit = reaches(r, ivec3(x, y, z)) ? 1u << (local & 31u) : 0u;
-                    bits |= local < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
-                }
-        for (bool some = bits != uvec2(0u); some; some = false) enter(block, base, bits, 8u * i + k);
+    ivec3 base = block_of_node(origin_node(part)), blocks = field_brick(r.last) - field_brick(r.first);
+    // The bricks that it reaches: three bits for each row along x, from the first brick's place in its block on.
+    vec3 x = distances(r, 0), y = distances(r, 1), z = distances(r, 2);
+    ivec3 from = r.first & (FIELD_BRICK - 1);
+    uint rows[9];
+    for (int k = 0; k < 9; ++k) {
+        bvec3 reached = lessThan(x + y[k % 3] + z[k / 3], vec3(r.reach * r.reach));
+        rows[k] = (uint(reached.x) | uint(reached.y) << 1 | uint(reached.z) << 2) << from.x;
+    }
+    for (uint b = 0u; b < 8u; ++b) {
+        ivec3 ahead = ivec3(b & 1u, (b >> 1) & 1u, b >> 2);
+        for (bool look = all(lessThanEqual(ahead, blocks)); look; look = false) {
+            uvec2 bits = uvec2(0u);
+            for (int k = 0; k < 9; ++k) {
+                ivec2 at = from.yz + ivec2(k % 3, k / 3) - FIELD_BRICK * ahead.yz;
+                bool in_block = ((at.x | at.y) & ~(FIELD_BRICK - 1)) == 0;
+                uint local = field_local(ivec3(0, at)), row = rows[k] >> (FIELD_BRICK * ahead.x) & uint((1 << FIELD_BRICK) - 1);
+                row = in_block ? row << (local & 31u) : 0u;
+                bits |= local < 32u ? uvec2(row, 0u) : uvec2(0u, row);
+            }
+            for (bool some = bits != uvec2(0u); some; some = false) enter(block_of(r, b), base, bits, 8u * i + b);
+        }
     }
 }
 #endif
@@ -155,47 +172,49 @@ void main() {
 }
 #endif
 
-#if defined(SCATTER) || defined(BALLS) || defined(STRAY)
+#ifdef LIST
 layout(set = 0, binding = 8, std430) writeonly buffer BallBlock { uvec2 at[]; } balls;
 
-// Enters a ball in the list of a brick, the k-th of a slot's block.
-void list_ball(Reach r, ivec3 brick, uint slot, uint k, uint number) {
-    uint entry = atomicAdd(head.balls, 1u);
-    if (entry >= build.ball_capacity) {
-        atomicAdd(counters.at[COUNTERS + BALLS_LEFT_OUT], 1u);
-        return;
+// Whether the field does not enclose one of the body's particles.
+bool strays(vec4 point, Reach r, ivec3 base) {
+    // The field where it is, between nodes, and its gradient.
+    float f = 0.0;
+    vec3 gradient = vec3(0.0);
+    for (uint c = 0u; c < 8u; ++c) {
+        ivec3 step = ivec3(c & 1u, (c >> 1) & 1u, c >> 2), node = r.node + step;
+        vec3 weights = mix(1.0 - r.part, r.part, bvec3(step));
+        uvec4 words;
+        field_slot(field_brick(field_brick(node)), base, build.slots, words);
+        uint number = field_number(words, field_local(field_brick(node)));
+        uint pair = nodes.at[FIELD_NODE_WORDS * number + field_local(node) / 2u];
+        float sum = float(int(pair >> (16 * (node.x & 1)) & 0xffffu));
+        f += weights.x * weights.y * weights.z * sum;
+        gradient += mix(vec3(-sum), vec3(sum), bvec3(step)) * weights.yzx * weights.zxy;
     }
-    atomicOr(table.at[FIELD_SLOT * slot + FIELD_BALLS + (k >> 5)], 1u << (k & 31u));
-    uint next = atomicExchange(records.at[number * FIELD_RECORD + FIELD_FIRST_BALL], entry + 1u);
-    balls.at[entry] = uvec2(field_packed_ball(vec3(r.node - (brick << FIELD_BRICK_BITS)) + r.part), next);
+    if (point.w < FIELD_TIP) f -= FIELD_BEYOND / SPLASH_RADIUS * build.ball * length(gradient);
+    return f < float(build.level);
 }
 
-#endif
-
-#ifdef STRAY
 void main() {
     uint i = invocation();
     vec4 point = points.at[min(i, build.count - 1u)];
-    // A loop, since drivers on CPUs may run a branch for all invocations that go together where none takes it.
-    for (bool look = i < build.count && point.w > 0.0 && point.w < FIELD_SURE; look; look = false) {
-        ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
-        Reach r = reach_of(vec4(point.xyz, -1.0));
-        // The field where it is, between nodes.
-        float f = 0.0;
+    bool ball = i < build.count && point.w < 0.0;
+    ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
+    Reach r = reach_of(vec4(point.xyz, -1.0));
+    for (bool look = i < build.count && point.w > 0.0 && point.w < FIELD_SURE; look; look = false) ball = strays(point, r, base);
+    for (uint k = 0u; ball && k < 8u; ++k) {
+        ivec3 brick = r.first + ivec3(k & 1u, (k >> 1) & 1u, k >> 2);
         uvec4 words;
-        for (uint c = 0u; c < 8u; ++c) {
-            ivec3 step = ivec3(c & 1u, (c >> 1) & 1u, c >> 2), node = r.node + step;
-            vec3 weights = mix(1.0 - r.part, r.part, bvec3(step));
-            field_slot(field_brick(field_brick(node)), base, build.slots, words);
-            uint number = field_number(words, field_local(field_brick(node)));
-            uint pair = nodes.at[FIELD_NODE_WORDS * number + field_local(node) / 2u];
-            f += weights.x * weights.y * weights.z * float(int(pair >> (16 * (node.x & 1)) & 0xffffu));
-        }
-        for (uint k = 0u; f < float(build.level) && k < 8u; ++k) {
-            ivec3 brick = r.first + ivec3(k & 1u, (k >> 1) & 1u, k >> 2);
-            uint slot = field_slot(field_brick(brick), base, build.slots, words), local = field_local(brick);
-            uint number = field_number(words, local);
-            if (all(lessThanEqual(brick, r.last)) && reaches(r, brick) && number > 0u) list_ball(r, brick, slot, local, number);
+        uint slot = field_slot(field_brick(brick), base, build.slots, words), local = field_local(brick), number = field_number(words, local);
+        for (bool list = all(lessThanEqual(brick, r.last)) && reaches(r, brick) && number > 0u; list; list = false) {
+            uint entry = atomicAdd(head.balls, 1u);
+            if (entry >= build.ball_capacity) {
+                atomicAdd(counters.at[COUNTERS + BALLS_LEFT_OUT], 1u);
+            } else {
+                atomicOr(table.at[FIELD_SLOT * slot + FIELD_BALLS + (local >> 5)], 1u << (local & 31u));
+                uint next = atomicExchange(records.at[number * FIELD_RECORD + FIELD_FIRST_BALL], entry + 1u);
+                balls.at[entry] = uvec2(field_packed_ball(vec3(r.node - (brick << FIELD_BRICK_BITS)) + r.part), next);
+            }
         }
     }
 }
@@ -206,46 +225,40 @@ layout(constant_id = 1) const int ACROSS = 6; // nodes that a kernel can reach o
 
 // Of the three bricks along each axis those in which a row of nodes lies.
 uvec3 one_of(uvec3 first, uvec3 second, uvec3 third, int which) { return which == 0 ? first : which == 1 ? second : third; }
-#endif
 
-#if defined(SCATTER) || defined(BALLS)
+// A block's first brick, and which it has.
+uvec3 known_block(ivec3 block, ivec3 base) {
+    uvec4 words;
+    field_slot(block, base, build.slots, words);
+    return uvec3(words[FIELD_FIRST_BRICK], field_there(words));
+}
+
 void main() {
     uint i = invocation();
-#ifdef SCATTER
-    if (i >= build.count || points.at[i].w == 0.0) return;
-#else
-    if (i >= build.count || points.at[i].w >= 0.0) return;
-#endif
+    if (i >= build.count || points.at[i].w <= 0.0) return;
     vec4 point = points.at[i];
     Reach r = reach_of(point);
-    bool ball = point.w < 0.0;
-    // The blocks that it reaches: of each the slot, its first brick and which it has.
     ivec3 base = ivec3(head.base_x, head.base_y, head.base_z), blocks = field_brick(r.last) - field_brick(r.first);
-    uint slots[8], firsts[8];
-    uvec2 there[8];
+    uvec3 known[8];
     for (uint b = 0u; b < 8u; ++b) {
-        slots[b] = build.slots;
-        firsts[b] = 0u;
-        there[b] = uvec2(0u);
-        for (bool look = all(lessThanEqual(field_from_local(b & 1u | (b & 2u) << 1 | (b & 4u) << 2), blocks)); look; look = false) {
-            uvec4 words;
-            slots[b] = field_slot(block_of(r, b), base, build.slots, words);
-            firsts[b] = words[FIELD_FIRST_BRICK];
-            there[b] = field_there(words);
-        }
+        known[b] = uvec3(0u);
+        for (bool look = all(lessThanEqual(ivec3(b & 1u, (b >> 1) & 1u, b >> 2), blocks)); look; look = false)
+            known[b] = known_block(block_of(r, b), base);
     }
     // The numbers of its bricks, by x, in rows by y and z.
     uvec3 numbers[9];
-    for (int k = 0; k < 27; ++k) {
-        ivec3 brick = r.first + ivec3(k % 3, k / 3 % 3, k / 9), block = field_brick(brick) - field_brick(r.first);
-        int b = block.x | block.y << 1 | block.z << 2;
-        uint local = field_local(brick), number = 0u;
-        if (all(lessThanEqual(brick, r.last)) && field_bit(there[b], local)) number = firsts[b] + field_before(there[b], local);
-        numbers[k / 3][k % 3] = number;
-        for (bool list = ball && number > 0u && reaches(r, brick); list; list = false) list_ball(r, brick, slots[b], local, number);
+    for (int k = 0; k < 9; ++k) {
+        ivec3 row = r.first + ivec3(0, k % 3, k / 3);
+        bvec2 ahead = notEqual(field_brick(row).yz, field_brick(r.first).yz);
+        uvec3 near = ahead.y ? (ahead.x ? known[6] : known[4]) : (ahead.x ? known[2] : known[0]);
+        uvec3 far = ahead.y ? (ahead.x ? known[7] : known[5]) : (ahead.x ? known[3] : known[1]);
+        for (int x = 0; x < 3; ++x) {
+            ivec3 brick = row + ivec3(x, 0, 0);
+            uvec3 block = field_brick(brick).x == field_brick(r.first).x ? near : far;
+            bool there = all(lessThanEqual(brick, r.last)) && field_bit(block.yz, field_local(brick));
+            numbers[k][x] = there ? block.x + field_before(block.yz, field_local(brick)) : 0u;
+        }
     }
-#ifdef SCATTER
-    if (ball) return;
     float unit = unit_of(point), per_reach = 1.0 / build.reach;
     // Nodes from the first that it can reach on, in spacings from the point, and among those of its bricks.
     ivec3 low = ivec3(floor(r.part - build.reach)) + 1, at = r.node + low - (r.first << FIELD_BRICK_BITS);
@@ -275,7 +288,6 @@ void main() {
             }
         }
     }
-#endif
 }
 #endif
 
@@ -334,7 +346,7 @@ void main() {
     uint home = records.at[record + FIELD_HOME] - 1u, slot = home / FIELD_NODES;
     if (home == 0xffffffffu) return; // a number that no block has got
     ivec3 own = (field_place(slot) << FIELD_BRICK_BITS) + field_from_local(home);
-    if (k < 8u) find_brick(own, ivec3(k & 1u, (k >> 1) & 1u, k >> 2));
+    for (bool find = k < 8u; find; find = false) find_brick(own, ivec3(k & 1u, (k >> 1) & 1u, k >> 2));
     if (k < 4u) surface[k] = 0u;
     if (k < 2u) found[k] = 0u;
     barrier();
@@ -347,10 +359,8 @@ void main() {
         if (k < 2u) records.at[record + FIELD_INSIDE + k] = found[1] * 0xffffffffu;
         return;
     }
-    if (k < 27u) {
-        ivec3 step = ivec3(k % 3u, k / 3u % 3u, k / 9u) - 1;
-        if (any(lessThan(step, ivec3(0)))) find_brick(own, step);
-    }
+    ivec3 step = ivec3(k % 3u, k / 3u % 3u, k / 9u) - 1;
+    for (bool find = k < 27u && any(lessThan(step, ivec3(0))); find; find = false) find_brick(own, step);
     barrier();
     for (uint i = k; i < AROUND * AROUND * AROUND; i += FIELD_NODES) {
         uvec3 node = uvec3(i % AROUND, i / AROUND % AROUND, i / (AROUND * AROUND));

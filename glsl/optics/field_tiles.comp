@@ -26,8 +26,13 @@ layout(set = 0, binding = 5, std430) readonly buffer BallBlock { uvec2 at[]; } b
 void cover(vec3 low, vec3 high) {
     float nearest = FARTHEST, farthest = 0.0;
     vec2 first = vec2(FARTHEST), last = vec2(-FARTHEST);
+    vec3 corner_0 = to_eye(low), edges = (high - low) * push.spacing;
+    mat3 turned = mat3(frame.view);
     for (int c = 0; c < 8; ++c) {
-        vec3 corner = to_eye(mix(low, high, vec3(c & 1, (c >> 1) & 1, c >> 2)));
+        vec3 corner = corner_0;
+        if ((c & 1) != 0) corner += edges.x * turned[0];
+        if ((c & 2) != 0) corner += edges.y * turned[1];
+        if ((c & 4) != 0) corner += edges.z * turned[2];
         nearest = min(nearest, -corner.z);
         farthest = max(farthest, -corner.z);
         vec2 pixel = project(corner);

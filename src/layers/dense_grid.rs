@@ -17,8 +17,7 @@ use crate::{
     resources::ImageSpec,
     scene::Scene,
     shader::{
-        DENSE_GRID_CORNER_COMP, DENSE_GRID_EMPTY, DENSE_GRID_FRAG, DENSE_GRID_GATHER_COMP, DENSE_GRID_VERT,
-        FIELD_BALLS_COMP, FIELD_BRICK,
+        DENSE_GRID_CORNER_COMP, DENSE_GRID_EMPTY, DENSE_GRID_FRAG, DENSE_GRID_GATHER_COMP, DENSE_GRID_VERT, FIELD_BRICK,
     },
 };
 use ash::vk;
@@ -97,7 +96,6 @@ impl DenseGrid {
             let nodes = [self.nodes_x, self.nodes_y, self.nodes_z].map(|n| n.to_string()).join(", ");
             return plan.fail(Error::parameter("nodes_x, nodes_y, nodes_z", nodes, remedy));
         }
-        plan.dispatch("field", building.listing(&FIELD_BALLS_COMP), per_particle(build.count));
 
         let bounds = plan.buffer("dense grid box", 6 * 4);
         plan.fill("dense grid", bounds, 0, vk::WHOLE_SIZE, DENSE_GRID_EMPTY);

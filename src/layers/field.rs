@@ -13,9 +13,9 @@ use crate::{
     prepare::rest_density,
     scene::Scene,
     shader::{
-        FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_MARK_COMP, FIELD_MOST_BRICKS,
-        FIELD_NODE_WORDS, FIELD_NODES, FIELD_NUMBER_COMP, FIELD_ONE, FIELD_RECORD, FIELD_SCATTER_COMP, FIELD_SLOT,
-        FIELD_STRAY_COMP, FieldBuild, FieldHead, PARTICLE_GROUP, SPLASH_RADIUS, Shader,
+        FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_LIST_COMP, FIELD_MARK_COMP,
+        FIELD_MOST_BRICKS, FIELD_NODE_WORDS, FIELD_NODES, FIELD_NUMBER_COMP, FIELD_ONE, FIELD_RECORD,
+        FIELD_SCATTER_COMP, FIELD_SLOT, FieldBuild, FieldHead, PARTICLE_GROUP, SPLASH_RADIUS, Shader,
     },
     space::power_of_two,
 };
@@ -97,7 +97,7 @@ impl Field {
             // Balls, which are the least that there is, reach into 1.3 blocks each, and 2.2 bricks.
             slots: (3 * bricks / 4).next_power_of_two().max(64) as u32,
             cell_capacity: cells as u32,
-            ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count) as u32,
+            ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count).next_multiple_of(2) as u32,
             spacing: self.spacing * (radius * unit),
             reach: self.kernel_radius / self.spacing,
             unit: (f64::from(FIELD_ONE) / rest_density(f64::from(self.kernel_radius))) as f32,
@@ -114,7 +114,7 @@ impl Field {
         (2.0 * build.reach).ceil() as u32
     }
 
-    /// Builds it; what `add` does between its passes brings the particles' shares to the nodes and lists the balls.
+    /// Builds it; what `add` does between its passes brings the particles' shares to the nodes.
     pub(super) fn build_by(
         &self,
         plan: &mut Plan,
@@ -133,7 +133,7 @@ impl Field {
         for zeros in [head, table, records, nodes] {
             plan.fill("field", zeros, 0, vk::WHOLE_SIZE, 0);
         }
-        let building = Building { head, table, records, nodes, balls, points: points.points, build };
+        let building = Building { head, table, records, nodes, points: points.points, build };
         // Where the host prepared the points, the shaders do not look; something has to be bound all the same.
         let from_origin = |call: Call| {
             let extent = points.extent.unwrap_or(points.points);
@@ -147,8 +147,14 @@ impl Field {
             .update("records", records);
         plan.dispatch("field", number, per_particle(build.slots));
         add(plan, &building);
-        let stray = building.listing(&FIELD_STRAY_COMP).read("nodes", nodes);
-        plan.dispatch("field", stray, per_particle(build.count));
+        let list = building
+            .call(&FIELD_LIST_COMP)
+            .update("head", head)
+            .read("points", points.points)
+            .update("records", records)
+            .read("nodes", nodes)
+            .write("balls", balls);
+        plan.dispatch("field", list, per_particle(build.count));
         let finish = building
             .call(&FIELD_FINISH_COMP)
             .read("head", head)
@@ -167,9 +173,12 @@ impl Filling for Field {
 
     fn record(&self, plan: &mut Plan, scene: &Scene, points: &Points) -> Volume {
         self.build_by(plan, scene, points, |plan, building| {
-            let scatter = building
-                .listing(&FIELD_SCATTER_COMP)
+            let scatter = Call::compute(&FIELD_SCATTER_COMP)
+                .read("head", building.head)
+                .read("table", building.table)
+                .read("points", building.points)
                 .update("nodes", building.nodes)
+                .push_all(&building.build)
                 .constant("ACROSS", Field::across(&building.build));
             plan.dispatch("field", scatter, per_particle(building.build.count));
         })
@@ -182,7 +191,6 @@ pub(super) struct Building {
     pub table: Target,
     pub records: Target,
     pub nodes: Target,
-    pub balls: Target,
     pub points: Target,
     pub build: FieldBuild,
 }
@@ -191,15 +199,6 @@ impl Building {
     /// One of its passes.
     fn call(&self, shader: &'static Shader) -> Call {
         Call::compute(shader).update("table", self.table).push_all(&self.build).counting(&COUNTED)
-    }
-
-    /// One that lists balls.
-    pub fn listing(&self, shader: &'static Shader) -> Call {
-        self.call(shader)
-            .update("head", self.head)
-            .read("points", self.points)
-            .update("records", self.records)
-            .update("balls", self.balls)
     }
 }
 

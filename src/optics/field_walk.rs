@@ -53,6 +53,7 @@ fn through(plan: &mut Plan, scene: &Scene, field: &Volume, tiles: &Tiles, shader
         ("table", "table_texels", field.table),
         ("records", "record_texels", field.records),
         ("cells", "cell_texels", field.cells),
+        ("balls", "ball_texels", field.balls),
     ];
     // As texels too, where the device has so large texel buffers.
     let texels = read.iter().all(|(.., buffer)| plan.bytes(*buffer).is_some_and(|bytes| bytes <= scene.texels_size));
@@ -60,7 +61,6 @@ fn through(plan: &mut Plan, scene: &Scene, field: &Volume, tiles: &Tiles, shader
     let (call, vertices) = tiles.draw(plan, scene, shader, false);
     let call = call
         .read("head", field.head)
-        .read("balls", field.balls)
         .read("tiles", tiles.bounds)
         .constant("TEXELS", texels)
         .push("slots", field.build.slots)

@@ -20,7 +20,7 @@ pub(crate) struct Sorted {
 pub(crate) fn record(plan: &mut Plan, scene: &Scene, preparation: &Preparation, extent: Target) -> Sorted {
     // Indices, read from one half and written to the other.
     let order = plan.array("sort order", 8 * preparation.entries);
-    let sorted = plan.array("sorted positions", 12 * u64::from(scene.count));
+    let sorted = plan.array("sorted positions", 16 * u64::from(scene.count));
     let sums = plan.array("digit sums", sums_bytes(preparation.entries, DIGITS));
     let positions = plan.given(External::Positions);
     let mut prepare = preparation.constants;
@@ -33,13 +33,15 @@ pub(crate) fn record(plan: &mut Plan, scene: &Scene, preparation: &Preparation, 
         prepare.sort_pass = pass;
         // How many of these passes the occupied cells need only the device knows: the others are empty.
         let (blocks, rows) = (4 * u64::from(EXTENT_DISPATCH + 6 * pass), 4 * u64::from(EXTENT_DISPATCH + 6 * pass + 3));
-        let count = keys(step(&SORT_COUNT_COMP, &prepare)).read("order", order).update("sums", sums);
+        let count =
+            keys(step(&SORT_COUNT_COMP, &prepare)).read("order", order).update("sorted", sorted).update("sums", sums);
         let relation = preparation.constants.entries_per_particle != 1;
         let scan = Call::compute(&SORT_SCAN_COMP)
             .constant("RELATION_TABLE", relation)
             .read("extent", extent)
             .update("sums", sums);
-        let scatter = keys(step(&SORT_SCATTER_COMP, &prepare)).update("order", order).read("sums", sums);
+        let scatter =
+            keys(step(&SORT_SCATTER_COMP, &prepare)).update("order", order).read("sorted", sorted).read("sums", sums);
         for (call, arguments) in [(count, blocks), (scan, rows), (scatter, blocks)] {
             plan.dispatch("sort", call, Groups::Indirect(extent, arguments));
         }

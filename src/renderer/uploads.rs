@@ -7,7 +7,7 @@ use crate::{
     device::Limits,
     environment::{Equirect, footprints},
     layers::{Kind, field::MOST_POINTS},
-    particles::{Class, Particles, Point},
+    particles::{Particles, Point},
     prepare::PrepareError,
     resources::{Buffer, Image, ImageSpec, Resource},
     scene::Scene,
@@ -115,8 +115,7 @@ impl Renderer {
         let mut buffer = Buffer::new(&self.host, POINTS, bytes, usage, Location::Upload)?;
         let unit = space::power_of_two(self.scene.space.radius as f32);
         for (p, to) in points.iter().zip(buffer.mapped().chunks_exact_mut(POINT_BYTES as usize)) {
-            let density = if p.class == Class::Splash { -p.density } else { p.density };
-            to.copy_from_slice(bytemuck::bytes_of(&(p.position * unit).extend(density)));
+            to.copy_from_slice(bytemuck::bytes_of(&(p.position * unit).extend(p.signed_density())));
         }
         self.given += 1;
         if let Some(old) = self.points.replace(buffer) {

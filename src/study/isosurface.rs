@@ -4,7 +4,7 @@
 
 use super::{mesh::Mesh, reconstruct::ReconstructError};
 use crate::{
-    Class, Point,
+    Point,
     layers::field::{
         Field,
         twin::{Lattice, Place, weights},
@@ -109,7 +109,7 @@ pub fn isosurface(points: &[Point], radius: f32) -> Result<Mesh, ReconstructErro
     let unit = power_of_two(radius);
     let mut lattice = Lattice::new(&Field::default(), radius);
     lattice.spacing = f64::from(SPACING * radius * unit);
-    let (splash, body): (Vec<&Point>, Vec<&Point>) = points.iter().partition(|p| p.class == Class::Splash);
+    let (splash, body): (Vec<&Point>, Vec<&Point>) = points.iter().partition(|p| p.is_ball());
     let body: Vec<Vec4> = body.iter().map(|p| (p.position * unit).extend(p.density)).collect();
     let balls: Vec<DVec3> = splash.iter().map(|p| (p.position * unit).as_dvec3() / lattice.spacing).collect();
     let nodes = Nodes::new(&body, &balls, &lattice);

@@ -71,6 +71,10 @@ fn over_the_environment_it_is_the_ordinary_picture() {
                     seen += usize::from(alpha > 0.0 && (whole - sky).abs() > 0.01);
                     // A byte may be half of one off, before it is multiplied.
                     let over = alpha * linear(png[4 * i + c]) + (1.0 - alpha) * sky;
+                    // What is brighter than white a byte cannot hold.
+                    if alone > alpha {
+                        continue;
+                    }
                     let off = srgb(over.clamp(0.0, 1.0)) - srgb(whole.clamp(0.0, 1.0));
                     assert!(
                         off.abs() <= 1.0 + 255.0 * tolerance,

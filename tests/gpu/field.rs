@@ -44,8 +44,7 @@ pub fn shoot(driver: &Driver, positions: &[Vec3], case: &Case) -> (Shot, Vec<Vec
 /// Points as the device has them.
 fn packed(points: &[Point], radius: f32) -> Vec<Vec4> {
     let unit = 2f32.powi(-radius.log2().floor() as i32);
-    let sign = |p: &Point| if p.class == Class::Splash { -p.density } else { p.density };
-    points.iter().map(|p| (p.position * unit).extend(sign(p))).collect()
+    points.iter().map(|p| (p.position * unit).extend(p.signed_density())).collect()
 }
 
 /// Those that the device has made.
@@ -90,6 +89,11 @@ pub fn clouds() -> Vec<(&'static str, f32, Vec<Vec3>)> {
     stray.push(Vec3::new(-7e4, 1.3, 2.0));
     let mut crowd = block([3, 3, 3], 0.1, Vec3::ZERO, 0.1);
     crowd.extend([Vec3::new(0.3, 0.1, 0.2); 3000]);
+    // Edges and corners of a sheet, and what lies between a lone drop and a body.
+    let mut thin = block([5, 1, 5], 0.1, Vec3::ZERO, 0.1);
+    thin.extend(block([8, 1, 1], 0.1, Vec3::new(0.0, 0.7, 0.1), 0.1));
+    thin.extend((1..9).map(|k| Vec3::new(0.9 * k as f32 + 0.02 * k as f32, -0.8, 0.0)));
+    thin.extend((1..9).map(|k| Vec3::new(0.9 * k as f32 + 0.19, -0.8, 0.02 * k as f32)));
     // Blocks 512 to either side of the origin's: coordinates of more bits than a key has for them.
     let aside = |block: Vec3| 3.2 * block + 1.6;
     let far = [Vec3::new(-512.0, 1.0, 0.0), Vec3::ZERO, Vec3::new(512.0, 0.0, 0.0)].map(aside).to_vec();
@@ -99,6 +103,7 @@ pub fn clouds() -> Vec<(&'static str, f32, Vec<Vec3>)> {
         ("a block far out", 0.01, block([6, 5, 7], 0.01, Vec3::new(-700.0, 300.0, -41.0), 0.3)),
         ("a small block", 1e-8, block([5, 5, 5], 1e-8, Vec3::splat(-3.3e-8), 0.2)),
         ("a stray 1e5 radii away", 0.7, stray),
+        ("a sheet, a thread and pairs", 0.1, thin),
         ("a crowd on one spot", 0.1, crowd),
         ("one particle", 0.1, vec![Vec3::new(-0.03, 0.2, -7.0)]),
     ]
@@ -182,7 +187,7 @@ pub fn check(shot: &Shot, [points, added]: [&[Vec4]; 2], lattice: &Lattice, roun
     for point in points.iter().filter(|p| p.w != 0.0) {
         let x = point.truncate().as_dvec3() / lattice.spacing;
         // Splashes, and what the field does not enclose.
-        let enclosed = enclosed(&bricks, lattice.level, x, f64::from(point.w.abs()));
+        let enclosed = enclosed(&bricks, lattice.level, lattice.ball / lattice.spacing, x, f64::from(point.w.abs()));
         if point.w > 0.0 && enclosed > 1.0001 {
             continue;
         }

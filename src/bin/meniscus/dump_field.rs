@@ -3,10 +3,9 @@
 use crate::{dump::npy, prepared, render::Job};
 use glam::{DVec3, IVec3};
 use meniscus::{
-    Class,
     host::Session,
     layers::field::twin::{Lattice, Words},
-    shader::{FIELD_ONE, FIELD_SLOT},
+    shader::{FIELD_CROWD, FIELD_DENSEST, FIELD_ONE, FIELD_RIM, FIELD_SLOT, FIELD_THIN, FIELD_THINNED},
 };
 use serde_json::{Value, json};
 use std::error::Error;
@@ -48,10 +47,9 @@ pub fn write(job: &Job, session: &mut Session, mut write: impl FnMut(&str, Vec<u
         Some(points) => points,
         None => job.scene.points()?,
     };
-    let sign = |c: Class| if c == Class::Splash { -1.0 } else { 1.0 };
     let point = points.iter().flat_map(|p| {
         let x = p.position.as_dvec3() + job.scene.origin;
-        [x.x, x.y, x.z, sign(p.class) * f64::from(p.density)]
+        [x.x, x.y, x.z, f64::from(p.signed_density())]
     });
     write("field_points.npy", npy(&[points.len() as u64, 4], point)?)?;
     write("field.json", serde_json::to_vec_pretty(&about(spacing, &lattice, job))?)
@@ -71,6 +69,6 @@ fn about(spacing: f64, lattice: &Lattice, job: &Job) -> Value {
         "held": "of each cell that holds the surface, in the order of bricks and bits, a byte at its corners z, y, x: the density times 128 / level, rounded down, 255 at most; field_gradients: z, y, x, axis, central differences times spacing times 127 / 0.75, scaled to 127 at most",
         "directory": "a block of 4 x 4 x 4 bricks a slot, the last slot empty: its key, 0 where the slot is free; the number of its first brick (field_numbers), after which its others follow; bits of its bricks, x + 4 y + 16 z, two words each: those that there are, that hold the surface, into which balls reach; its place, by which brick coordinates are 4 times that",
         "points": "x, y, z, number density as a part of a filled body's, negative for balls, 0 where nothing is",
-        "field": "sum over points of positive density r of W(distance / support) / (filled_weights max(min(r, 1.2), r / 64)), W the cubic spline, 1 at 0",
+        "field": format!("sum over points of positive density r of W(distance / support) / (filled_weights max(min(r, e, {FIELD_DENSEST}), {FIELD_CROWD} r)), W the cubic spline, 1 at 0, e = max({FIELD_RIM} - {FIELD_THINNED} ({FIELD_RIM} - r), {FIELD_THIN})"),
     })
 }

@@ -4,10 +4,11 @@ use super::Field;
 use crate::{
     prepare::density::{rest_density, spline},
     shader::{
-        FIELD_BALL, FIELD_BALL_BELOW, FIELD_BALL_BITS, FIELD_BALL_STEPS, FIELD_BALLS, FIELD_BRICK, FIELD_CELL_RECORD,
-        FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_FIRST_BALL, FIELD_FIRST_BRICK, FIELD_FIRST_CELL, FIELD_HALF,
-        FIELD_INSIDE, FIELD_NODE_WORDS, FIELD_NODES, FIELD_ONE, FIELD_PLACE, FIELD_PROBES, FIELD_RECORD, FIELD_SLOT,
-        FIELD_STEEPEST, FIELD_SURE, FIELD_SURFACE, FIELD_THERE, SPLASH_RADIUS,
+        FIELD_BALL, FIELD_BALL_BELOW, FIELD_BALL_BITS, FIELD_BALL_STEPS, FIELD_BALLS, FIELD_BEYOND, FIELD_BRICK,
+        FIELD_CELL_RECORD, FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_FIRST_BALL, FIELD_FIRST_BRICK,
+        FIELD_FIRST_CELL, FIELD_HALF, FIELD_INSIDE, FIELD_NODE_WORDS, FIELD_NODES, FIELD_ONE, FIELD_PLACE,
+        FIELD_PROBES, FIELD_RECORD, FIELD_RIM, FIELD_SLOT, FIELD_STEEPEST, FIELD_SURE, FIELD_SURFACE, FIELD_THERE,
+        FIELD_THIN, FIELD_THINNED, FIELD_TIP, SPLASH_RADIUS,
     },
     space::power_of_two,
 };
@@ -57,7 +58,8 @@ impl Lattice {
         if density <= 0.0 {
             return 0.0;
         }
-        let divisor = density.min(f64::from(FIELD_DENSEST)).max(f64::from(FIELD_CROWD) * density);
+        let rim = (FIELD_RIM - FIELD_THINNED * (FIELD_RIM - point.w)).max(FIELD_THIN);
+        let divisor = density.min(f64::from(rim.min(FIELD_DENSEST))).max(f64::from(FIELD_CROWD) * density);
         spline(position.distance(point.truncate().as_dvec3()) / self.support) / (self.rest * divisor)
     }
 
@@ -275,14 +277,23 @@ fn bits(words: &[u32]) -> u64 {
 }
 
 /// Whether the field encloses a particle of the body with this density, at x in spacings: there by how much, as a part of the
-/// level, or surely. One that it does not is a ball, too.
-pub fn enclosed(bricks: &BTreeMap<Place, Brick>, level: f64, x: DVec3, density: f64) -> f64 {
+/// level, or surely. One that it does not is a ball, too, whose radius in spacings is given.
+pub fn enclosed(bricks: &BTreeMap<Place, Brick>, level: f64, ball: f64, x: DVec3, density: f64) -> f64 {
     if density >= f64::from(FIELD_SURE) {
         return f64::INFINITY;
     }
     let first = x.floor();
     let node = |step: IVec3| f64::from(node_of(bricks, (first.as_ivec3() + step).to_array())) / f64::from(FIELD_ONE);
-    weights(x - first).map(|(step, weight)| weight * node(step)).sum::<f64>() / level
+    let f = |part: DVec3| -> f64 { weights(part).map(|(step, weight)| weight * node(step)).sum() };
+    let part = x - first;
+    // Along an axis what is trilinear is straight.
+    let slope = |axis: usize| {
+        let [mut low, mut high] = [part; 2];
+        (low[axis], high[axis]) = (0.0, 1.0);
+        f(high) - f(low)
+    };
+    let beyond = if density < f64::from(FIELD_TIP) { f64::from(FIELD_BEYOND / SPLASH_RADIUS) * ball } else { 0.0 };
+    (f(part) - beyond * DVec3::from([0, 1, 2].map(slope)).length()) / level
 }
 
 /// The field at a node times [`FIELD_ONE`], from bricks; 0 where there is none.

@@ -11,7 +11,7 @@ pub const NEIGHBOURS: Case = Case {
     name: "neighbours",
     about: "0: no particle, 1: one, 2: two, 3: a row of seven, 4: a sheet of 25, 5: forty at one place, 6: all of these",
     x: "scene",
-    promised: &["imai16"],
+    promised: super::BOTH,
     measures: &[
         NO_NUMBER,
         HOLES,
