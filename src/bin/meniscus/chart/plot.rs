@@ -8,7 +8,7 @@ use std::error::Error;
 const SIZE: (u32, u32) = (1100, 700);
 const FONT: &str = "sans-serif";
 /// Colours that people who see fewer of them tell apart (Okabe and Ito 2008).
-const COLORS: [RGBColor; 8] = [
+const COLORS: [RGBColor; 10] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -17,6 +17,8 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(86, 180, 233),
     RGBColor(90, 90, 90),
     RGBColor(200, 0, 40),
+    RGBColor(130, 80, 30),
+    RGBColor(110, 60, 170),
 ];
 
 /// Why a chart could not be drawn.
@@ -66,7 +68,9 @@ where
     let bound = |axis: usize, pick: fn(f64, f64) -> f64| at.iter().map(|p| p[axis]).reduce(pick).unwrap_or(1.0);
     let (fastest, slowest) = (bound(0, f64::min).max(1e-4), bound(0, f64::max).max(1e-4));
     let worst = bound(1, f64::max).max(one.widest().unwrap_or(0.0)).max(1e-3);
-    let (left, right) = (0.8 * fastest, 1.6 * slowest);
+    // Beyond the slowest there is room for the list of methods.
+    let left = 0.8 * fastest;
+    let right = 1.6 * slowest * (slowest / left).powf(0.2);
     let title = format!("{}: {} particles, {}x{}", one.name, one.particles, one.size[0], one.size[1]);
     let mut chart = ChartBuilder::on(&canvas)
         .caption(title, (FONT, 20))
