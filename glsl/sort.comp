@@ -12,7 +12,7 @@ layout(local_size_x = PARTICLE_GROUP) in;
 #include "positions.glsl"
 layout(set = 0, binding = 3, std430) buffer OrderBlock { uint at[]; } order; // two halves, read and written in turns
 layout(set = 0, binding = 4, std430) buffer SumBlock { uint at[]; } sums;
-layout(set = 0, binding = 5, std430) buffer SortedBlock { uint at[]; } sorted; // floats
+layout(set = 0, binding = 5, std430) buffer SortedBlock { uint at[]; } sorted; // keys; at last bits of positions, four words each
 #include "prefix.glsl"
 
 const uint ITEMS = BLOCK / PARTICLE_GROUP;

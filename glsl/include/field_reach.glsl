@@ -5,7 +5,7 @@ ivec3 node_of(vec3 x, out vec3 part) {
     return ivec3(cell_of(x.x, build.spacing, part.x), cell_of(x.y, build.spacing, part.y), cell_of(x.z, build.spacing, part.z));
 }
 
-// A point among the bricks. A particle of the body reaches as far as its kernel, another is a ball.
+// A point among the bricks. A particle in the field reaches as far as its kernel, another is a ball.
 struct Reach {
     ivec3 node;  // at or before it
     vec3 part;   // how far beyond that it lies, in spacings

@@ -57,10 +57,10 @@ struct Block {
     uvec2 balls;
 };
 const Block NOWHERE = Block(vec3(NONE), 0u, uvec2(0u), uvec2(0u), uvec2(0u));
-bool is_in(vec3 cell, vec3 low, float edge) { return edge * floor(cell * (1.0 / edge)) == low; }
 void look_up(inout Block b, vec3 x) {
-    for (bool look = !is_in(x, b.low, BLOCK_EDGE); look; look = false) {
-        b.low = BLOCK_EDGE * floor(x / BLOCK_EDGE);
+    vec3 low = BLOCK_EDGE * floor(x / BLOCK_EDGE);
+    for (bool look = low != b.low; look; look = false) {
+        b.low = low;
         uvec4 words;
         uint slot = field_slot(base_block() + whole(b.low / BLOCK_EDGE), base_block(), push.slots, words);
         b.first = words[FIELD_FIRST_BRICK];
@@ -200,10 +200,12 @@ const uint AXIS_Y = 1u << 8, AXIS_Z = 1u << 16, BEYOND_FOUR = 0xfcfcfcu, BEYOND_
 // leaves them all; they begin at `low`. `beyond`: whether they are 4 x 4 x 4, or the one that it is in. Says whether it came to one.
 // Each step goes up or down one axis as the ray does, so that there are few, whatever its numbers are.
 bool cross_cubes(inout Course c, bool go, vec3 low, float edge, uint beyond, uvec2 stops, out uint k, inout bool first) {
-    vec3 cube = edge * floor(c.cell / edge), sides = edge * (2.0 * c.ahead - 1.0);
+    // Powers of two, so that no place is rounded.
+    float per_edge = edge == 1.0 ? 1.0 : edge == BRICK_EDGE ? 1.0 / BRICK_EDGE : 1.0 / BLOCK_EDGE;
+    vec3 cube = edge * floor(c.cell * per_edge), sides = edge * (2.0 * c.ahead - 1.0);
     vec3 next = (cube + edge * c.ahead - c.x) * c.per_dir, between = edge * abs(c.per_dir);
     uvec3 up = uvec3(1u, AXIS_Y, AXIS_Z), ways = mix(0u - up, up, greaterThan(c.ahead, vec3(0.0)));
-    uint place = beyond == BEYOND_ONE ? 0u : uint(whole(dot((cube - low) / edge, vec3(1.0, float(AXIS_Y), float(AXIS_Z)))));
+    uint place = beyond == BEYOND_ONE ? 0u : uint(whole(dot((cube - low) * per_edge, vec3(1.0, float(AXIS_Y), float(AXIS_Z)))));
     bool stop = false, moved = false;
     while (go) {
         k = (place | place >> 6 | place >> 12) & 63u;

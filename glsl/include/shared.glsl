@@ -286,7 +286,7 @@ struct Prepare {
 #define FIELD_RIM 0.65
 #define FIELD_THIN 0.45
 #define FIELD_THINNED 3.0
-// From the number density FIELD_SURE on the field encloses a particle of the body. Below FIELD_TIP, at corners and ends of threads, it has to go on
+// From the number density FIELD_SURE on the field encloses a particle. Below FIELD_TIP, at corners and ends of threads, it has to go on
 // beyond the particle for FIELD_BEYOND radii.
 #define FIELD_SURE 0.9
 #define FIELD_TIP 0.52

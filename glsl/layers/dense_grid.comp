@@ -1,4 +1,4 @@
-// The density field on a dense grid (docs/methods.md, "A dense grid"): CORNER finds the box of bricks that the body's particles
+// The density field on a dense grid (docs/methods.md, "A dense grid"): CORNER finds the box of bricks that the particles in the field
 // reach, whose first corner is the grid's; dense_grid.vert and dense_grid.frag add up the shares; GATHER takes the sums to the
 // sparse bricks, as whole numbers.
 #version 460

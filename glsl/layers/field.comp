@@ -1,6 +1,6 @@
 // The density field as bricks of nodes, where there is any (docs/methods.md, "Density field"). MARK enters the bricks that points reach
 // in the directory, block by block, NUMBER numbers them, SCATTER adds each point's share to the nodes that it reaches, as whole numbers, whose
-// sum does not hang on the order; LIST lists the balls in each brick: splashes, and those of the body's particles that the field does not
+// sum does not hang on the order; LIST lists the balls in each brick: splashes that are alone, and particles in the field that it does not
 // enclose; FINISH finds the cells that hold the surface, and puts together what a walk looks at in them.
 //
 // Drivers on CPUs may run a branch for all invocations that go together, even where none takes it, but a loop only while one goes on:
@@ -24,9 +24,11 @@ layout(set = 0, binding = 2, std430) readonly buffer TableBlock { uint at[]; } t
 #else
 layout(set = 0, binding = 2, std430) buffer TableBlock { uint at[]; } table;
 #endif
+#ifndef SCATTER
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 layout(constant_id = 0) const uint COUNTERS = 0; // slot of its first counter
 const uint BRICKS = 0u, CELLS = 1u, BRICKS_LEFT_OUT = 2u, CELLS_LEFT_OUT = 3u, BALLS_LEFT_OUT = 4u;
+#endif
 #ifndef FINISH
 // Positions; w: their number density as a part of a filled body's, negative for balls, 0 where there is nothing.
 layout(set = 0, binding = 3, std430) readonly buffer PointBlock { vec4 at[]; } points;
@@ -175,7 +177,7 @@ void main() {
 #ifdef LIST
 layout(set = 0, binding = 8, std430) writeonly buffer BallBlock { uvec2 at[]; } balls;
 
-// Whether the field does not enclose one of the body's particles.
+// Whether the field does not enclose one of its particles.
 bool strays(vec4 point, Reach r, ivec3 base) {
     // The field where it is, between nodes, and its gradient.
     float f = 0.0;

@@ -23,8 +23,8 @@ use ash::vk;
 
 parameters! {
     /// The level of a density field on a sparse grid (Iwasaki06), each particle's share divided by its number density; splashes
-    /// are balls beside it, and so are particles of the body that the surface does not enclose: at the ends of sheets and threads, at
-    /// the corners of a block. What is counted is read with the feature `inspect` (`Renderer::counters`).
+    /// of less than 0.4 of a filled body's are balls beside it, and so is what the surface does not enclose: at the ends of sheets and
+    /// threads, at the corners of a block. What is counted is read with the feature `inspect` (`Renderer::counters`).
     pub struct Field {
         /// Distance of the grid's nodes; ours, by measurement: half as much changes little and has eight times the nodes
         spacing: f32 = 2.0, "particle radii", "1.5 to 3" => |s| (1.5..=3.0).contains(s);
@@ -97,7 +97,7 @@ impl Field {
             // Balls, which are the least that there is, reach into 1.3 blocks each, and 2.2 bricks.
             slots: (3 * bricks / 4).next_power_of_two().max(64) as u32,
             cell_capacity: cells as u32,
-            ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count).next_multiple_of(2) as u32,
+            ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count).next_multiple_of(2) as u32, // the walk reads two at once
             spacing: self.spacing * (radius * unit),
             reach: self.kernel_radius / self.spacing,
             unit: (f64::from(FIELD_ONE) / rest_density(f64::from(self.kernel_radius))) as f32,

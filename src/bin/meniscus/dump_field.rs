@@ -43,7 +43,7 @@ pub fn write(job: &Job, session: &mut Session, mut write: impl FnMut(&str, Vec<u
         })
         .collect();
     write("field_balls.npy", npy(&[centers.len() as u64, 3], centers.into_iter().flatten())?)?;
-    let points = match prepared::points(session, radius)? {
+    let points = match prepared::points(session, radius, job.picture.preparation.splash_threshold)? {
         Some(points) => points,
         None => job.scene.points()?,
     };

@@ -20,7 +20,7 @@ pub struct Prepared {
 }
 
 /// Reads it back; `radius` is the particles'.
-pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
+pub fn read(session: &mut Session, radius: f32, splash_threshold: f32) -> Result<Prepared, HostError> {
     let words = |session: &mut Session, id| Ok::<_, HostError>(session.words(id, 0)?.unwrap_or_default());
     let mut array = |id| {
         let triple = |w: &[u32]| Vec3::from_slice(&[w[0], w[1], w[2]].map(f32::from_bits));
@@ -28,7 +28,7 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     };
     let (centers, diagonals, mixed) =
         (array("particle centres")?, array("particle shapes (diagonal)")?, array("particle shapes (mixed)")?);
-    if let Some(points) = points(session, radius)? {
+    if let Some(points) = points(session, radius, splash_threshold)? {
         return from_points(session, radius, points);
     }
     let order = order(session, centers.len())?;
@@ -56,14 +56,15 @@ pub fn read(session: &mut Session, radius: f32) -> Result<Prepared, HostError> {
     Ok(Prepared { particles: Particles { radius, ellipsoids, splash_count }, report, index })
 }
 
-/// What the device made a density field of, in its order; `None` where it did not. What is not finite has no density.
-pub fn points(session: &mut Session, radius: f32) -> Result<Option<Vec<Point>>, HostError> {
+/// What the device made a density field of, in its order; `None` where it did not. What is not finite has no density. Signs say which are
+/// balls, the threshold which are splashes.
+pub fn points(session: &mut Session, radius: f32, splash_threshold: f32) -> Result<Option<Vec<Point>>, HostError> {
     let Some(words) = session.words("particle points", 0)? else { return Ok(None) };
     let point = |w: &[u32]| {
         let p = Vec4::from_slice(&[w[0], w[1], w[2], w[3]].map(f32::from_bits));
         // A power of two rounds nothing.
         let unit = 2f32.powi(-radius.log2().floor() as i32);
-        let class = if p.w < 0.0 { Class::Splash } else { Class::Body };
+        let class = if p.w < splash_threshold { Class::Splash } else { Class::Body };
         Point { position: p.truncate() / unit, density: p.w.abs(), class }
     };
     Ok(Some(words.chunks_exact(4).map(point).collect()))

@@ -196,7 +196,8 @@ fn render(job: &mut Job, session: &mut Session) -> Result<Option<String>, Box<dy
         }
     }
     if job.picture.preparer().on_device() {
-        job.prepared = Some(prepared::read(session, job.scene.particles.radius)?);
+        job.prepared =
+            Some(prepared::read(session, job.scene.particles.radius, job.picture.preparation.splash_threshold)?);
     }
     if let Some(folder) = &job.args.dump {
         dump::write(folder, job, session)?;

@@ -276,7 +276,7 @@ fn bits(words: &[u32]) -> u64 {
     u64::from(words[0]) | u64::from(words[1]) << 32
 }
 
-/// Whether the field encloses a particle of the body with this density, at x in spacings: there by how much, as a part of the
+/// Whether the field encloses one of its particles with this density, at x in spacings: there by how much, as a part of the
 /// level, or surely. One that it does not is a ball, too, whose radius in spacings is given.
 pub fn enclosed(bricks: &BTreeMap<Place, Brick>, level: f64, ball: f64, x: DVec3, density: f64) -> f64 {
     if density >= f64::from(FIELD_SURE) {
