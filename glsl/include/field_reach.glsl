@@ -22,13 +22,15 @@ Reach reach_of(vec4 point) {
     return r;
 }
 
-// Whether a brick's cells lie nearer to the point than it reaches.
-bool reaches(Reach r, ivec3 brick) {
-    vec3 low = vec3((brick << FIELD_BRICK_BITS) - r.node) - r.part, across = max(max(low, -low - float(FIELD_BRICK)), 0.0);
-    return dot(across, across) < r.reach * r.reach;
+// How far three bricks along an axis, from the first on, lie from the point, squared; beyond the last one infinitely far. It reaches those
+// of which the sum over the axes is less than its reach, squared.
+vec3 distances(Reach r, int axis) {
+    vec3 low = float((r.first[axis] << FIELD_BRICK_BITS) - r.node[axis]) - r.part[axis] + float(FIELD_BRICK) * vec3(0.0, 1.0, 2.0);
+    vec3 across = max(max(low, -low - float(FIELD_BRICK)), 0.0);
+    return mix(across * across, vec3(1e30), greaterThan(ivec3(0, 1, 2), ivec3(r.last[axis] - r.first[axis])));
 }
 
-// What a particle of the body adds where its kernel is 1, in whole numbers of a node.
+// What a particle in the field adds where its kernel is 1, in whole numbers of a node.
 float unit_of(vec4 point) {
     float rim = max(FIELD_RIM - FIELD_THINNED * (FIELD_RIM - point.w), FIELD_THIN);
     return build.unit / max(min(min(point.w, rim), FIELD_DENSEST), FIELD_CROWD * point.w);

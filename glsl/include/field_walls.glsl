@@ -184,28 +184,21 @@ struct Course {
     vec3 cell;  // in which it is there: its first node
 };
 
-// Takes it out of its cell.
-void leave(inout Course c) {
-    vec3 border = (c.cell + c.ahead - c.x) * c.per_dir;
-    float out_of = min(border.x, min(border.y, border.z));
-    c.t = max(c.t, out_of);
-    vec3 next = c.cell + 2.0 * c.ahead - 1.0;
-    c.cell = mix(c.cell, next, equal(border, vec3(out_of)));
-}
-
 // Places among 4 x 4 x 4 cubes, in a byte each, and what a step adds to them; whoever has left them has set one of these bits.
 const uint AXIS_Y = 1u << 8, AXIS_Z = 1u << 16, BEYOND_FOUR = 0xfcfcfcu, BEYOND_ONE = 0xffffffu;
 
-// Takes a ray from cube to cube of one edge, from its own on, until it comes to one of those that `stops` has, by its number k, or
-// leaves them all; they begin at `low`. `beyond`: whether they are 4 x 4 x 4, or the one that it is in. Says whether it came to one.
-// Each step goes up or down one axis as the ray does, so that there are few, whatever its numbers are.
-bool cross_cubes(inout Course c, bool go, vec3 low, float edge, uint beyond, uvec2 stops, out uint k, inout bool first) {
+// Takes a ray through a block or brick, by its first node and its span, from cube to cube of its 4 x 4 x 4, from its own on, until it comes to
+// one of those that `stops` has, by its number k, or leaves it; at once where `stops` has none. Says whether it came to one. Each step
+// goes up or down one axis as the ray does, so that there are few, whatever its numbers are.
+bool cross_cubes(inout Course c, bool go, vec3 low, float span, uvec2 stops, out uint k, inout bool first) {
+    bool at_once = stops == uvec2(0u);
     // Powers of two, so that no place is rounded.
-    float per_edge = edge == 1.0 ? 1.0 : edge == BRICK_EDGE ? 1.0 / BRICK_EDGE : 1.0 / BLOCK_EDGE;
+    float edge = at_once ? span : span / BRICK_EDGE, per_edge = at_once ? 1.0 / span : BRICK_EDGE / span;
+    uint beyond = at_once ? BEYOND_ONE : BEYOND_FOUR;
     vec3 cube = edge * floor(c.cell * per_edge), sides = edge * (2.0 * c.ahead - 1.0);
     vec3 next = (cube + edge * c.ahead - c.x) * c.per_dir, between = edge * abs(c.per_dir);
     uvec3 up = uvec3(1u, AXIS_Y, AXIS_Z), ways = mix(0u - up, up, greaterThan(c.ahead, vec3(0.0)));
-    uint place = beyond == BEYOND_ONE ? 0u : uint(whole(dot((cube - low) * per_edge, vec3(1.0, float(AXIS_Y), float(AXIS_Z)))));
+    uint place = at_once ? 0u : uint(whole(dot((cube - low) * per_edge, vec3(1.0, float(AXIS_Y), float(AXIS_Z)))));
     bool stop = false, moved = false;
     while (go) {
         k = (place | place >> 6 | place >> 12) & 63u;
@@ -244,23 +237,22 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
             ++steps;
             look_up(block, c.cell);
             uvec2 stops = inside ? block.surfaces : block.surfaces | block.balls;
-            bool none = stops == uvec2(0u);
             uint k;
-            bool stop = cross_cubes(c, true, block.low, none ? BLOCK_EDGE : BRICK_EDGE, none ? BEYOND_ONE : BEYOND_FOUR, stops, k, first);
+            bool stop = cross_cubes(c, true, block.low, BLOCK_EDGE, stops, k, first);
             uvec4 words = stop ? brick_words(block.first + field_before(block.there, k)) : uvec4(0u);
             bool surface = stop && field_bit(block.surfaces, k);
             ball = words[FIELD_FIRST_BALL];
             vec3 brick = BRICK_EDGE * floor(c.cell / BRICK_EDGE);
             meet_balls(inside ? 0u : ball, brick, x, dir, wall);
             uvec2 bits = surface ? words.xy : uvec2(0u);
-            at_surface = cross_cubes(c, stop, brick, surface ? 1.0 : BRICK_EDGE, surface ? BEYOND_FOUR : BEYOND_ONE, bits, k, first);
+            at_surface = cross_cubes(c, stop, brick, BRICK_EDGE, bits, k, first);
             if (at_surface) cell = words[FIELD_FIRST_CELL] + field_before(bits, k);
         }
         if (at_surface) {
             uvec4 corners = cell_words(cell, 0u);
             vec4 low = held(corners.x), high = held(corners.y);
             vec3 place = c.cell, border = (place + c.ahead - x) * per_dir;
-            float begin = c.t, end = max(min(border.x, min(border.y, border.z)), begin);
+            float begin = c.t, out_of = min(border.x, min(border.y, border.z)), end = max(out_of, begin);
             vec3 from = x + begin * dir - place, along = (end - begin) * dir;
             vec4 h = side * vec4(trilinear(low, high, from), trilinear(low, high, from + along / 3.0),
                                  trilinear(low, high, from + along * (2.0 / 3.0)), trilinear(low, high, from + along));
@@ -273,8 +265,8 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
                 root = 0.0;
             }
             first = false;
-            leave(c);
-            if (met) c.t = mix(begin, end, root);
+            c.t = met ? mix(begin, end, root) : end;
+            c.cell = mix(place, place + 2.0 * c.ahead - 1.0, equal(border, vec3(out_of)));
             if (met && c.t < min(reach, wall.t)) wall = Wall(c.t, CLASS_BODY, place, cell, ball);
         }
     }

@@ -23,8 +23,6 @@ layout(set = 0, binding = 1, std430) buffer HeadBlock { FieldHead head; };
 layout(set = 0, binding = 2, std430) readonly buffer TableBlock { uint at[]; } table;
 #else
 layout(set = 0, binding = 2, std430) buffer TableBlock { uint at[]; } table;
-#endif
-#ifndef SCATTER
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 layout(constant_id = 0) const uint COUNTERS = 0; // slot of its first counter
 const uint BRICKS = 0u, CELLS = 1u, BRICKS_LEFT_OUT = 2u, CELLS_LEFT_OUT = 3u, BALLS_LEFT_OUT = 4u;
@@ -87,13 +85,6 @@ void enter(ivec3 block, ivec3 base, uvec2 bits, uint name) {
         slot = (slot + 1u) & mask;
     }
     if (!done) atomicAdd(counters.at[COUNTERS + BRICKS_LEFT_OUT], uint(bitCount(bits.x) + bitCount(bits.y)));
-}
-
-// How far three bricks along an axis lie from a point, squared; beyond the last one that it reaches infinitely far.
-vec3 distances(Reach r, int axis) {
-    vec3 low = float((r.first[axis] << FIELD_BRICK_BITS) - r.node[axis]) - r.part[axis] + float(FIELD_BRICK) * vec3(0.0, 1.0, 2.0);
-    vec3 across = max(max(low, -low - float(FIELD_BRICK)), 0.0);
-    return mix(across * across, vec3(1e30), greaterThan(ivec3(0, 1, 2), ivec3(r.last[axis] - r.first[axis])));
 }
 
 void main() {
@@ -204,11 +195,13 @@ void main() {
     ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
     Reach r = reach_of(vec4(point.xyz, -1.0));
     for (bool look = i < build.count && point.w > 0.0 && point.w < FIELD_SURE; look; look = false) ball = strays(point, r, base);
+    vec3 x = distances(r, 0), y = distances(r, 1), z = distances(r, 2);
     for (uint k = 0u; ball && k < 8u; ++k) {
-        ivec3 brick = r.first + ivec3(k & 1u, (k >> 1) & 1u, k >> 2);
+        ivec3 step = ivec3(k & 1u, (k >> 1) & 1u, k >> 2), brick = r.first + step;
+        bool reached = x[step.x] + y[step.y] + z[step.z] < r.reach * r.reach;
         uvec4 words;
         uint slot = field_slot(field_brick(brick), base, build.slots, words), local = field_local(brick), number = field_number(words, local);
-        for (bool list = all(lessThanEqual(brick, r.last)) && reaches(r, brick) && number > 0u; list; list = false) {
+        for (bool list = reached && number > 0u; list; list = false) {
             uint entry = atomicAdd(head.balls, 1u);
             if (entry >= build.ball_capacity) {
                 atomicAdd(counters.at[COUNTERS + BALLS_LEFT_OUT], 1u);

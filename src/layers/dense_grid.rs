@@ -24,7 +24,8 @@ use ash::vk;
 
 parameters! {
     /// The level of the same density field on a dense grid, to whose slices sprites of the particles add, four at once
-    /// (Iwasaki06); splashes of less than 0.4 of a filled body's number density are balls beside it. What of the liquid lies beyond the grid is left out, and counted.
+    /// (Iwasaki06); splashes of less than 0.4 of a filled body's number density are balls beside it. What of the liquid lies beyond
+    /// the grid is left out, and counted.
     pub struct DenseGrid {
         /// Distance of the grid's nodes, as of `field`
         spacing: f32 = 2.0, "particle radii", "1.5 to 3" => |s| (1.5..=3.0).contains(s);

@@ -97,7 +97,8 @@ impl Field {
             // Balls, which are the least that there is, reach into 1.3 blocks each, and 2.2 bricks.
             slots: (3 * bricks / 4).next_power_of_two().max(64) as u32,
             cell_capacity: cells as u32,
-            ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count).next_multiple_of(2) as u32, // the walk reads two at once
+            // The walk reads two at once.
+            ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count).next_multiple_of(2) as u32,
             spacing: self.spacing * (radius * unit),
             reach: self.kernel_radius / self.spacing,
             unit: (f64::from(FIELD_ONE) / rest_density(f64::from(self.kernel_radius))) as f32,

@@ -1,6 +1,6 @@
 //! A second surface of particles, beside splashsurf's: marching cubes of our own density field (`layers::field`), on nodes twice as
-//! dense, by its CPU twin's formula; what is a ball beside the field is one here. Of splashsurf there is only the table of triangles in it: kernel,
-//! normalisation, level and normals are others, and nothing is smoothed.
+//! dense, by its CPU twin's formula; what is a ball beside the field is one here. Of splashsurf there is only the table of triangles in
+//! it: kernel, normalisation, level and normals are others, and nothing is smoothed.
 
 use super::{mesh::Mesh, reconstruct::ReconstructError};
 use crate::{

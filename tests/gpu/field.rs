@@ -187,7 +187,7 @@ pub fn check(shot: &Shot, [points, added]: [&[Vec4]; 2], lattice: &Lattice, roun
     for point in points.iter().filter(|p| p.w != 0.0) {
         let x = point.truncate().as_dvec3() / lattice.spacing;
         // Splashes, and what the field does not enclose.
-        let enclosed = enclosed(&bricks, lattice.level, lattice.ball / lattice.spacing, x, f64::from(point.w.abs()));
+        let enclosed = enclosed(&bricks, lattice, x, f64::from(point.w.abs()));
         if point.w > 0.0 && enclosed > 1.0001 {
             continue;
         }

@@ -277,8 +277,8 @@ fn bits(words: &[u32]) -> u64 {
 }
 
 /// Whether the field encloses one of its particles with this density, at x in spacings: there by how much, as a part of the
-/// level, or surely. One that it does not is a ball, too, whose radius in spacings is given.
-pub fn enclosed(bricks: &BTreeMap<Place, Brick>, level: f64, ball: f64, x: DVec3, density: f64) -> f64 {
+/// level, or surely. One that it does not is a ball, too.
+pub fn enclosed(bricks: &BTreeMap<Place, Brick>, lattice: &Lattice, x: DVec3, density: f64) -> f64 {
     if density >= f64::from(FIELD_SURE) {
         return f64::INFINITY;
     }
@@ -292,8 +292,9 @@ pub fn enclosed(bricks: &BTreeMap<Place, Brick>, level: f64, ball: f64, x: DVec3
         (low[axis], high[axis]) = (0.0, 1.0);
         f(high) - f(low)
     };
-    let beyond = if density < f64::from(FIELD_TIP) { f64::from(FIELD_BEYOND / SPLASH_RADIUS) * ball } else { 0.0 };
-    (f(part) - beyond * DVec3::from([0, 1, 2].map(slope)).length()) / level
+    let radius = lattice.ball / lattice.spacing / f64::from(SPLASH_RADIUS);
+    let beyond = if density < f64::from(FIELD_TIP) { f64::from(FIELD_BEYOND) * radius } else { 0.0 };
+    (f(part) - beyond * DVec3::from([0, 1, 2].map(slope)).length()) / lattice.level
 }
 
 /// The field at a node times [`FIELD_ONE`], from bricks; 0 where there is none.
