@@ -121,7 +121,8 @@ const uint MOST_AT_ONCE = 4096u, MOST_DENSITY = 0x7fffffffu;
 
 void add(inout Sums s, EACH_BOOL near, uint many, Vectors o, EACH squared) {
     EACH d = sqrt(mix(EACH(prepare.support * prepare.support), squared, near));
-    EACH_UINT weight = EACH_UINT(spline(d * (1.0 / prepare.support)) * DENSITY_ONE + 0.5);
+    // To the nearest whole number by its bits: there are drivers that convert lane by lane.
+    EACH_UINT weight = floatBitsToUint(spline(d * (1.0 / prepare.support)) * DENSITY_ONE + 8388608.0) & 0x7fffffu;
     s.density = min(s.density + min(many, MOST_AT_ONCE) * weight, MOST_DENSITY);
 }
 #else
