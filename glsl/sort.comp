@@ -22,8 +22,7 @@ uint entry_at(uint rank, uint pass) { return pass == 0u ? rank : order.at[half_b
 
 uint digit_of(uint entry, bool kept) {
     uvec3 key = uvec3(kept ? sorted.at[entry] : 0u, 0u, 0u);
-    // A loop, since drivers on CPUs may run a branch for all invocations that go together where none takes it.
-    for (bool make = !kept; make; make = false) key = sort_key(entry_cell(entry));
+    if (!kept) key = sort_key(entry_cell(entry));
     uint from = prepare.sort_pass * DIGIT_BITS, word = from >> 5, shift = from & 31u;
     uint bits = key[word] >> shift;
     if (shift > 32u - DIGIT_BITS && word < 2u) bits |= key[word + 1u] << (32u - shift);

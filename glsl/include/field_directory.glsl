@@ -11,9 +11,7 @@ uint field_slot(ivec3 block, ivec3 base, uint slots, out uvec4 words) {
     for (uint i = 0u; i < FIELD_PROBES && !done; ++i) {
         words = directory_texel(FIELD_SLOT_TEXELS * slot);
         bool same = words.x == key;
-        // A loop, since drivers on CPUs may run a branch for all invocations that go together where none takes it.
-        for (bool far = same && key >= FIELD_FAR; far; far = false)
-            same = field_place(slot) == block;
+        if (same && key >= FIELD_FAR) same = field_place(slot) == block;
         if (same) found = slot;
         done = same || words.x == 0u;
         slot = (slot + 1u) & (slots - 1u);

@@ -14,7 +14,7 @@ Wall first_wall(inout Block block, ivec2 pixel, vec3 x, vec3 dir, vec3 eye_dir, 
     if (bounds.x == INFINITE || gl_HelperInvocation) range = vec2(NONE, 0.0);
     stopped = false;
     // The near plane may lie in the liquid.
-    for (bool look = range.x <= 0.0 && range.y >= 0.0; look; look = false) {
+    if (range.x <= 0.0 && range.y >= 0.0) {
         uint ball;
         if (in_field(block, x, ball)) within = CLASS_BODY;
         else if (ball_around(x, ball, center)) within = CLASS_SPLASH;

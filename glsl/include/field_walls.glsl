@@ -1,9 +1,6 @@
 // Walls of the density field and of balls along a ray (docs/methods.md, "Walls in a field"). Lengths here are spacings of the
 // field's nodes, as in field_space.glsl.
 //
-// Drivers on CPUs may run a branch for all invocations that go together, even where none takes it, but a loop only while one goes on:
-// what few need to read is in loops here that go round once at most.
-//
 // Where the device has texel buffers as large as the field's buffers these are read as such: that takes less of a CPU's time. Otherwise something
 // small is bound in their place.
 layout(set = 0, binding = 2, std430) readonly buffer TableBlock { uvec4 at[]; } table;
@@ -59,7 +56,7 @@ struct Block {
 const Block NOWHERE = Block(vec3(NONE), 0u, uvec2(0u), uvec2(0u), uvec2(0u));
 void look_up(inout Block b, vec3 x) {
     vec3 low = BLOCK_EDGE * floor(x / BLOCK_EDGE);
-    for (bool look = low != b.low; look; look = false) {
+    if (low != b.low) {
         b.low = low;
         uvec4 words;
         uint slot = field_slot(base_block() + whole(b.low / BLOCK_EDGE), base_block(), push.slots, words);
@@ -243,7 +240,7 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
             bool surface = stop && field_bit(block.surfaces, k);
             ball = words[FIELD_FIRST_BALL];
             vec3 brick = BRICK_EDGE * floor(c.cell / BRICK_EDGE);
-            meet_balls(inside ? 0u : ball, brick, x, dir, wall);
+            if (!inside) meet_balls(ball, brick, x, dir, wall);
             uvec2 bits = surface ? words.xy : uvec2(0u);
             at_surface = cross_cubes(c, stop, brick, BRICK_EDGE, bits, k, first);
             if (at_surface) cell = words[FIELD_FIRST_CELL] + field_before(bits, k);

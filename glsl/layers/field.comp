@@ -2,9 +2,6 @@
 // in the directory, block by block, NUMBER numbers them, SCATTER adds each point's share to the nodes that it reaches, as whole numbers, whose
 // sum does not hang on the order; LIST lists the balls in each brick: splashes that are alone, and particles in the field that it does not
 // enclose; FINISH finds the cells that hold the surface, and puts together what a walk looks at in them.
-//
-// Drivers on CPUs may run a branch for all invocations that go together, even where none takes it, but a loop only while one goes on:
-// what few need is in loops here that go round once at most.
 #version 460
 // Compiled with one of: MARK, NUMBER, SCATTER, LIST, FINISH
 #extension GL_GOOGLE_include_directive : require
@@ -76,7 +73,7 @@ void enter(ivec3 block, ivec3 base, uvec2 bits, uint name) {
         uint at = FIELD_SLOT * slot, found = table.at[at];
         if (found == 0u) found = atomicCompSwap(table.at[at], 0u, own);
         done = found == 0u || found == own;
-        for (bool far = !done && own >= FIELD_FAR && found >= FIELD_FAR; far; far = false) done = block_named(found) == block;
+        if (!done && own >= FIELD_FAR && found >= FIELD_FAR) done = block_named(found) == block;
         if (done) {
             at += FIELD_THERE;
             if ((bits.x & ~table.at[at]) != 0u) atomicOr(table.at[at], bits.x);
@@ -103,7 +100,7 @@ void main() {
     }
     for (uint b = 0u; b < 8u; ++b) {
         ivec3 ahead = ivec3(b & 1u, (b >> 1) & 1u, b >> 2);
-        for (bool look = all(lessThanEqual(ahead, blocks)); look; look = false) {
+        if (all(lessThanEqual(ahead, blocks))) {
             uvec2 bits = uvec2(0u);
             for (int k = 0; k < 9; ++k) {
                 ivec2 at = from.yz + ivec2(k % 3, k / 3) - FIELD_BRICK * ahead.yz;
@@ -112,7 +109,7 @@ void main() {
                 row = in_block ? row << (local & 31u) : 0u;
                 bits |= local < 32u ? uvec2(row, 0u) : uvec2(0u, row);
             }
-            for (bool some = bits != uvec2(0u); some; some = false) enter(block_of(r, b), base, bits, 8u * i + b);
+            if (bits != uvec2(0u)) enter(block_of(r, b), base, bits, 8u * i + b);
         }
     }
 }
@@ -194,14 +191,14 @@ void main() {
     bool ball = i < build.count && point.w < 0.0;
     ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
     Reach r = reach_of(vec4(point.xyz, -1.0));
-    for (bool look = i < build.count && point.w > 0.0 && point.w < FIELD_SURE; look; look = false) ball = strays(point, r, base);
+    if (i < build.count && point.w > 0.0 && point.w < FIELD_SURE) ball = strays(point, r, base);
     vec3 x = distances(r, 0), y = distances(r, 1), z = distances(r, 2);
     for (uint k = 0u; ball && k < 8u; ++k) {
         ivec3 step = ivec3(k & 1u, (k >> 1) & 1u, k >> 2), brick = r.first + step;
         bool reached = x[step.x] + y[step.y] + z[step.z] < r.reach * r.reach;
         uvec4 words;
         uint slot = field_slot(field_brick(brick), base, build.slots, words), local = field_local(brick), number = field_number(words, local);
-        for (bool list = reached && number > 0u; list; list = false) {
+        if (reached && number > 0u) {
             uint entry = atomicAdd(head.balls, 1u);
             if (entry >= build.ball_capacity) {
                 atomicAdd(counters.at[COUNTERS + BALLS_LEFT_OUT], 1u);
@@ -237,7 +234,7 @@ void main() {
     uvec3 known[8];
     for (uint b = 0u; b < 8u; ++b) {
         known[b] = uvec3(0u);
-        for (bool look = all(lessThanEqual(ivec3(b & 1u, (b >> 1) & 1u, b >> 2), blocks)); look; look = false)
+        if (all(lessThanEqual(ivec3(b & 1u, (b >> 1) & 1u, b >> 2), blocks)))
             known[b] = known_block(block_of(r, b), base);
     }
     // The numbers of its bricks, by x, in rows by y and z.
@@ -341,7 +338,7 @@ void main() {
     uint home = records.at[record + FIELD_HOME] - 1u, slot = home / FIELD_NODES;
     if (home == 0xffffffffu) return; // a number that no block has got
     ivec3 own = (field_place(slot) << FIELD_BRICK_BITS) + field_from_local(home);
-    for (bool find = k < 8u; find; find = false) find_brick(own, ivec3(k & 1u, (k >> 1) & 1u, k >> 2));
+    if (k < 8u) find_brick(own, ivec3(k & 1u, (k >> 1) & 1u, k >> 2));
     if (k < 4u) surface[k] = 0u;
     if (k < 2u) found[k] = 0u;
     barrier();
@@ -355,7 +352,7 @@ void main() {
         return;
     }
     ivec3 step = ivec3(k % 3u, k / 3u % 3u, k / 9u) - 1;
-    for (bool find = k < 27u && any(lessThan(step, ivec3(0))); find; find = false) find_brick(own, step);
+    if (k < 27u && any(lessThan(step, ivec3(0)))) find_brick(own, step);
     barrier();
     for (uint i = k; i < AROUND * AROUND * AROUND; i += FIELD_NODES) {
         uvec3 node = uvec3(i % AROUND, i / AROUND % AROUND, i / (AROUND * AROUND));

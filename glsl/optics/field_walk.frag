@@ -94,7 +94,7 @@ float importance(Reflection r) { return max(r.light.x, max(r.light.y, r.light.z)
 
 vec3 light_of(Reflection r) {
     vec3 light = vec3(0.0);
-    for (bool look = importance(r) > 0.0; look; look = false) light = r.light * light_from(r.x, r.dir);
+    if (importance(r) > 0.0) light = r.light * light_from(r.x, r.dir);
     return light;
 }
 
@@ -159,7 +159,7 @@ bool handed_over(inout Walk w, inout Block block, Wall wall) {
     vec3 center;
     // Behind a ball there may be the body.
     bool body = false;
-    for (bool look = w.within == CLASS_SPLASH; look; look = false) body = in_field(block, w.x, ball);
+    if (w.within == CLASS_SPLASH) body = in_field(block, w.x, ball);
     bool other = !body && ball_around(w.x, ball, center);
     if (body) w.within = CLASS_BODY;
     if (other) {
