@@ -28,7 +28,7 @@ vec3 env_color(vec3 dir) {
     float size = float(textureSize(environment, 0).x), side = w[axis] < 0.0 ? -1.0 : 1.0;
     vec2 on_face = vec2(w[(axis + 1) % 3], w[(axis + 2) % 3]) / a[axis];
     vec2 q = (0.5 * on_face + 0.5) * size - 0.5, b = floor(q), f = q - b;
-    ivec2 p = ivec2(b);
+    ivec2 p = whole(b);
     return mix(mix(env_texel(p, size, axis, side), env_texel(p + ivec2(1, 0), size, axis, side), f.x),
                mix(env_texel(p + ivec2(0, 1), size, axis, side), env_texel(p + ivec2(1, 1), size, axis, side), f.x), f.y);
 }
@@ -67,7 +67,7 @@ vec3 env_color(vec3 dir) {
         vec2 q = angles * frame.environment_per_radian + vec2(0.5 * frame.environment_columns - 0.5, -0.5);
         q.y = max(q.y, 0.0); // the first row ends at the pole; the footprints of the last one end there
         vec2 b = floor(q), f = q - b;
-        ivec2 p = ivec2(b.x < 0.0 ? frame.environment_columns - 1.0 : b.x, b.y);
+        ivec2 p = whole(vec2(b.x < 0.0 ? frame.environment_columns - 1.0 : b.x, b.y));
         uvec4 texels = texelFetch(footprints, p, 0);
         vec2 right = vec2(1.0 - f.x, f.x), upper = right * (1.0 - f.y), lower = right * f.y;
         vec3 light = footprint_part(texels.x, upper.x) + footprint_part(texels.y, upper.y);
@@ -76,7 +76,7 @@ vec3 env_color(vec3 dir) {
     ivec2 size = textureSize(environment, 0);
     vec2 uv = angles * vec2(0.15915494309, 0.31830988618) + vec2(0.5, 0.0);
     vec2 q = uv * vec2(size) - 0.5, b = floor(q), f = q - b;
-    ivec2 p = ivec2(b);
+    ivec2 p = whole(b);
     return mix(mix(env_texel(p, size), env_texel(p + ivec2(1, 0), size), f.x),
                mix(env_texel(p + ivec2(0, 1), size), env_texel(p + ivec2(1, 1), size), f.x), f.y);
 }

@@ -36,10 +36,6 @@ uvec2 ball_entry(uint entry) {
 const float NONE = 1e30; // t of what is not met
 const float BRICK_EDGE = float(FIELD_BRICK), BLOCK_EDGE = float(FIELD_BRICK * FIELD_BRICK);
 
-// A float without fraction as a whole number, below 2^22 of either sign: there are drivers that convert lane by lane.
-int whole(float f) { return floatBitsToInt(f + 12582912.0) - 0x4b400000; }
-ivec3 whole(vec3 f) { return floatBitsToInt(f + 12582912.0) - 0x4b400000; }
-
 // Of a brick the cells that hold the surface, the number of the first of these and its first ball, each where FIELD_RECORD says.
 uvec4 brick_words(uint brick) { return record_texel(brick * (uint(FIELD_RECORD) / 4u)); }
 uvec2 brick_inside(uint brick) { return record_texel(brick * (uint(FIELD_RECORD) / 4u) + 1u).xy; }

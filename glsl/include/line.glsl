@@ -7,7 +7,7 @@ struct Ray {
     bool leaves_view; // whether the view's border or the near plane is what ends it
 };
 
-ivec2 nearest(vec2 position) { return clamp(ivec2(floor(position)), ivec2(0), ivec2(frame.size) - 1); }
+ivec2 nearest(vec2 position) { return whole(clamp(floor(position), vec2(0.0), frame.size - 1.0)); }
 
 // t at a screen-space parameter s, which runs evenly in pixels from 0 at the ray's start to 1 at its end: 1 / d is linear
 // in s.

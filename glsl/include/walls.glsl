@@ -18,9 +18,8 @@ struct Footprint {
 };
 
 Footprint footprint(vec2 position) {
-    vec2 q = position - 0.5, corner = floor(q);
-    ivec2 last = ivec2(frame.size) - 1;
-    return Footprint(clamp(ivec2(corner), ivec2(0), last), clamp(ivec2(corner) + 1, ivec2(0), last), q - corner);
+    vec2 q = position - 0.5, corner = floor(q), last = frame.size - 1.0;
+    return Footprint(whole(clamp(corner, vec2(0.0), last)), whole(clamp(corner + 1.0, vec2(0.0), last)), q - corner);
 }
 
 // From the lowest corner, so that the interpolation rounds at the spread's size and not at the depth's.

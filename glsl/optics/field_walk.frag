@@ -206,7 +206,7 @@ bool go_on(inout Walk w, inout Block block, out Wall wall) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(view_position());
+    ivec2 pixel = whole(floor(view_position()));
     vec3 v = view_ray(view_position()), eye_dir = normalize(v);
     Walk w = Walk(to_field(frame.near * v), transpose(mat3(frame.view)) * eye_dir, vec3(0.0), vec3(1.0), 0.0, 0.0, 0.0, AIR, vec3(0.0), -1,
                   OUTCOME_HIT, 0u, 0u, pixel);

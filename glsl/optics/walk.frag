@@ -182,7 +182,7 @@ bool go_on(inout Walk w, out Wall wall) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(view_position());
+    ivec2 pixel = whole(floor(view_position()));
     vec3 v = view_ray(view_position()), dir = normalize(v);
     int first;
     bool inside;
