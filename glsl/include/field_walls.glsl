@@ -180,6 +180,8 @@ struct Course {
 // Places among 4 x 4 x 4 cubes, in a byte each, and what a step adds to them; whoever has left them has set one of these bits.
 const uint AXIS_Y = 1u << 8, AXIS_Z = 1u << 16, BEYOND_FOUR = 0xfcfcfcu, BEYOND_ONE = 0xffffffu;
 
+uint cube_number(uint place) { return (place | place >> 6 | place >> 12) & 63u; }
+
 // Takes a ray through a block or brick, by its first node and its span, from cube to cube of its 4 x 4 x 4, from its own on, until it comes to
 // one of those that `stops` has, by its number k, or leaves it; at once where `stops` has none. Says whether it came to one. Each step
 // goes up or down one axis as the ray does, so that there are few, whatever its numbers are.
@@ -188,29 +190,28 @@ bool cross_cubes(inout Course c, bool go, vec3 low, float span, uvec2 stops, out
     // Powers of two, so that no place is rounded.
     float edge = at_once ? span : span / BRICK_EDGE, per_edge = at_once ? 1.0 / span : BRICK_EDGE / span;
     uint beyond = at_once ? BEYOND_ONE : BEYOND_FOUR;
-    vec3 cube = edge * floor(c.cell * per_edge), sides = edge * (2.0 * c.ahead - 1.0);
+    vec3 cube = edge * floor(c.cell * per_edge);
     vec3 next = (cube + edge * c.ahead - c.x) * c.per_dir, between = edge * abs(c.per_dir);
     uvec3 up = uvec3(1u, AXIS_Y, AXIS_Z), ways = mix(0u - up, up, greaterThan(c.ahead, vec3(0.0)));
-    uint place = at_once ? 0u : uint(whole(dot((cube - low) * per_edge, vec3(1.0, float(AXIS_Y), float(AXIS_Z)))));
-    bool stop = false, moved = false;
-    while (go) {
-        k = (place | place >> 6 | place >> 12) & 63u;
-        stop = field_bit(stops, k);
-        if (!stop) {
-            bool is_x = next.x <= next.y && next.x <= next.z, is_y = !is_x && next.y <= next.z, is_z = !is_x && !is_y;
-            c.t = max(c.t, is_x ? next.x : is_y ? next.y : next.z);
-            place += is_x ? ways.x : is_y ? ways.y : ways.z;
-            cube += mix(vec3(0.0), sides, bvec3(is_x, is_y, is_z));
-            next += mix(vec3(0.0), between, bvec3(is_x, is_y, is_z));
-            moved = true;
-        }
-        go = !stop && (place & beyond) == 0u;
+    uint begin = at_once ? 0u : uint(whole(dot((cube - low) * per_edge, vec3(1.0, float(AXIS_Y), float(AXIS_Z))))), place = begin;
+    float t = c.t;
+    bool look = go && !field_bit(stops, cube_number(place));
+    while (look) {
+        bool is_x = next.x <= next.y && next.x <= next.z, is_y = !is_x && next.y <= next.z;
+        t = is_x ? next.x : is_y ? next.y : next.z;
+        place += is_x ? ways.x : is_y ? ways.y : ways.z;
+        next += vec3(is_x ? between.x : 0.0, is_y ? between.y : 0.0, is_x || is_y ? 0.0 : between.z);
+        look = (place & beyond) == 0u && !field_bit(stops, cube_number(place));
     }
-    if (moved) {
+    k = cube_number(place);
+    if (place != begin) {
+        uint above = place + (1u + AXIS_Y + AXIS_Z); // so that none is negative
+        cube = (at_once ? cube : low) + edge * (vec3(uvec3(above, above >> 8, above >> 16) & 0xffu) - 1.0);
+        c.t = max(c.t, t);
         c.cell = clamp(floor(c.x + c.t * c.dir), cube, cube + (edge - 1.0));
         first = false;
     }
-    return stop;
+    return go && (place & beyond) == 0u;
 }
 
 // The first wall that a ray meets from x on, from t to `reach`: of the field from within it, or from outside of all liquid of whichever
