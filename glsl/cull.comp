@@ -45,7 +45,7 @@ void main() {
     }
     Ellipsoid e = to_eye(p);
     vec4 box = pixel_bounds(e);
-    ivec2 lo = ivec2(ceil(box.xy - 0.5)), hi = ivec2(floor(box.zw - 0.5));
+    ivec2 lo = whole(ceil(box.xy - 0.5)), hi = whole(floor(box.zw - 0.5));
     uint wanted = BACK_SIDES ? (VISIBLE_FRONT | VISIBLE_BACK) : VISIBLE_FRONT;
     uint verdict = all(lessThanEqual(lo, hi)) ? wanted : 0u;
     float near = -e.center.z - sqrt(e.sd.z), far = -e.center.z + sqrt(e.sd.z);

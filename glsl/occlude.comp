@@ -23,7 +23,7 @@ void main() {
     float near = -e.center.z - sqrt(e.sd.z), far = -e.center.z + sqrt(e.sd.z);
     if (near <= frame.near) return;
     vec4 box = pixel_bounds(e);
-    ivec2 lo = ivec2(ceil(box.xy - 0.5)), hi = ivec2(floor(box.zw - 0.5));
+    ivec2 lo = whole(ceil(box.xy - 0.5)), hi = whole(floor(box.zw - 0.5));
     // Few particles are larger than 64 pixels, and those hide little that others do not.
     if (any(greaterThanEqual(hi - lo, ivec2(LARGE)))) return;
     Cast c = cast_of(e);

@@ -19,6 +19,7 @@ layout(local_size_x = PARTICLE_GROUP) in;
 #include "positions.glsl"
 #include "runs.glsl"
 #include "spline.glsl"
+#include "whole.glsl"
 #ifdef POINTS
 // Positions; w: their number density as a part of a filled body's, negative for balls, 0 where there is nothing.
 layout(set = 0, binding = 12, std430) writeonly buffer PointBlock { vec4 at[]; } points;
@@ -121,8 +122,7 @@ const uint MOST_AT_ONCE = 4096u, MOST_DENSITY = 0x7fffffffu;
 
 void add(inout Sums s, EACH_BOOL near, uint many, Vectors o, EACH squared) {
     EACH d = sqrt(mix(EACH(prepare.support * prepare.support), squared, near));
-    // To the nearest whole number by its bits: there are drivers that convert lane by lane.
-    EACH_UINT weight = floatBitsToUint(spline(d * (1.0 / prepare.support)) * DENSITY_ONE + 8388608.0) & 0x7fffffu;
+    EACH_UINT weight = rounded(spline(d * (1.0 / prepare.support)) * DENSITY_ONE);
     s.density = min(s.density + min(many, MOST_AT_ONCE) * weight, MOST_DENSITY);
 }
 #else

@@ -180,6 +180,7 @@ struct Course {
 // Places among 4 x 4 x 4 cubes, in a byte each, and what a step adds to them; whoever has left them has set one of these bits.
 const uint AXIS_Y = 1u << 8, AXIS_Z = 1u << 16, BEYOND_FOUR = 0xfcfcfcu, BEYOND_ONE = 0xffffffu;
 
+// Which of the 64 is at a place.
 uint cube_number(uint place) { return (place | place >> 6 | place >> 12) & 63u; }
 
 // Takes a ray through a block or brick, by its first node and its span, from cube to cube of its 4 x 4 x 4, from its own on, until it comes to

@@ -8,6 +8,7 @@
 #include "shared.glsl"
 #include "groups.glsl"
 #include "cells.glsl"
+#include "whole.glsl"
 #include "field.glsl"
 layout(local_size_x = PARTICLE_GROUP) in;
 layout(push_constant) uniform PushBlock { FieldBuild build; };
@@ -270,9 +271,8 @@ void main() {
                 ivec3 own = ivec3((at.x & ~1) + 2 * pair, row_at);
                 vec2 dx = offset.x + float(own.x - at.x) + vec2(0.0, 1.0), q = sqrt(row + dx * dx) * per_reach;
                 vec2 far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
-                // To the nearest whole number by its bits: there are drivers that convert lane by lane.
                 vec2 weight = min(unit * (2.0 * far * far * far - 8.0 * near * near * near), FIELD_MOST_SHARE);
-                uvec2 share = floatBitsToUint(weight + 8388608.0) & 0x7fffffu;
+                uvec2 share = rounded(weight);
                 int b = own.x >> FIELD_BRICK_BITS;
                 uint number = b == 0 ? row_numbers.x : b == 1 ? row_numbers.y : row_numbers.z, both = share.x | share.y << 16;
                 // Without a number there was no room for the brick.

@@ -43,8 +43,8 @@ void cover(vec3 low, vec3 high) {
     bool crosses = nearest <= frame.near;
     if (farthest < frame.near || (!crosses && (any(lessThan(last + 0.5, vec2(0.0))) || any(greaterThan(first - 0.5, frame.size))))) return;
     ivec2 size = (ivec2(frame.size) + FIELD_TILE - 1) / FIELD_TILE;
-    ivec2 from = crosses ? ivec2(0) : ivec2(floor(clamp(first - 0.5, vec2(0.0), frame.size))) / FIELD_TILE;
-    ivec2 to = crosses ? size - 1 : min(ivec2(floor(clamp(last + 0.5, vec2(-1.0), frame.size))) / FIELD_TILE, size - 1);
+    ivec2 from = crosses ? ivec2(0) : whole(floor(clamp(first - 0.5, vec2(0.0), frame.size))) / FIELD_TILE;
+    ivec2 to = crosses ? size - 1 : min(whole(floor(clamp(last + 0.5, vec2(-1.0), frame.size))) / FIELD_TILE, size - 1);
     uvec2 bounds = uvec2(floatBitsToUint(max(nearest, frame.near)), INFINITE - floatBitsToUint(farthest));
     for (int y = from.y; y <= to.y; ++y)
         for (int x = from.x; x <= to.x; ++x) {

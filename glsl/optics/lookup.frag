@@ -42,8 +42,8 @@ layout(location = 0) out vec4 out_color;
 // What lies behind the liquid at a position of the picture, as far as the picture reaches.
 vec3 seen_at(vec2 p) {
 #ifdef SCENE
-    // Clamped before it is a whole number: those end at 2^31.
-    ivec2 pixel = ivec2(clamp(floor(p), vec2(0.0), frame.size - 1.0));
+    // Clamped before it is a whole number: those do not go as far.
+    ivec2 pixel = whole(clamp(floor(p), vec2(0.0), frame.size - 1.0));
     if (HOST_BACKGROUND || scene_linear(pixel) < CLEARED) return scene_light(pixel);
 #endif
     // Far beside the picture the square of the ray's length is no number.
