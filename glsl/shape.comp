@@ -70,6 +70,15 @@ void begin_list(uint k, uint number) {
 }
 #endif
 
+// Whether neighbours are counted or listed, so that ties have to be decided: what sums add of those as far as the reach is nothing.
+#if defined(NEIGHBOURS)
+#define COUNTS true
+#elif defined(POINTS)
+#define COUNTS false
+#else
+#define COUNTS YU_TURK
+#endif
+
 // Whether b - a is shorter than the reach: ties of float32 decided to 2^-45 of the square.
 bool nearer(vec3 a, vec3 b) {
     float reach = prepare.reach;
@@ -121,8 +130,7 @@ const float DENSITY_ONE = 262144.0;
 const uint MOST_AT_ONCE = 4096u, MOST_DENSITY = 0x7fffffffu;
 
 void add(inout Sums s, EACH_BOOL near, uint many, Vectors o, EACH squared) {
-    EACH d = sqrt(mix(EACH(prepare.support * prepare.support), squared, near));
-    EACH_UINT weight = rounded(spline(d * (1.0 / prepare.support)) * DENSITY_ONE);
+    EACH_UINT weight = rounded(spline(sqrt(squared) * (1.0 / prepare.support)) * DENSITY_ONE);
     s.density = min(s.density + min(many, MOST_AT_ONCE) * weight, MOST_DENSITY);
 }
 #else
@@ -331,8 +339,9 @@ EACH_BOOL neighbours_of(Batch b, vec3 y, out Vectors offset, out EACH squared) {
     float limit = prepare.reach * prepare.reach;
     offset = Vectors(y.x - b.x.x, y.y - b.x.y, y.z - b.x.z);
     squared = offset.x * offset.x + offset.y * offset.y + offset.z * offset.z;
-    EACH_BOOL near = LESS(squared, EACH(limit)), tie = LESS(abs(squared - limit), EACH(4.1e-6 * limit));
-    if (ANY(tie)) {
+    EACH_BOOL near = LESS(squared, EACH(limit));
+    if (COUNTS) {
+        EACH_BOOL tie = LESS(abs(squared - limit), EACH(4.1e-6 * limit));
         for (uint c = 0u; c < AT_ONCE; ++c) {
             if (OF(tie, c)) OF(near, c) = nearer(of(b.x, c), y);
         }

@@ -5,7 +5,7 @@ uint encode_normal(vec3 n) {
     vec2 p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
     if (n.z < 0.0) p = octahedral_wrap(p);
     // packSnorm2x16 rounds differently from driver to driver; this does not.
-    ivec2 q = ivec2(floor(clamp(p, -1.0, 1.0) * 32767.0 + 0.5));
+    ivec2 q = whole(floor(clamp(p, -1.0, 1.0) * 32767.0 + 0.5));
     return (uint(q.x) & 0xffffu) | (uint(q.y) << 16);
 }
 

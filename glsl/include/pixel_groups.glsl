@@ -7,8 +7,9 @@ ivec2 pixel_group() {
     bool long_comb = i < in_longer;
     if (long_comb) ++teeth;
     else i -= in_longer;
-    uint comb = i / teeth + (long_comb ? 0u : longer);
-    return ivec2(gl_WorkGroupID.x, i % teeth * 8u + comb);
+    // Whole numbers divide lane by lane on CPUs; so small ones are exact as floats.
+    uint before = uint(whole(floor((float(int(i)) + 0.5) / float(int(teeth)))));
+    return ivec2(gl_WorkGroupID.x, (i - before * teeth) * 8u + before + (long_comb ? 0u : longer));
 }
 
 // The invocation's pixel where groups are squares of that edge.

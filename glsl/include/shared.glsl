@@ -266,6 +266,8 @@ struct Prepare {
 #define FIELD_BRICK_BITS 2
 #define FIELD_BRICK 4
 #define FIELD_NODES 64
+// Invocations that look at one brick together, where all bricks are looked at.
+#define FIELD_LANES 8
 // What a filled body's density is in the whole numbers that are added up at nodes, of 16 bits each: two nodes beside each other on x share
 // a word.
 #define FIELD_ONE 8192
@@ -276,7 +278,7 @@ struct Prepare {
 #define FIELD_STEEPEST 0.75
 // A particle whose number density exceeds that of a filled body so many times counts as one of so much,
 #define FIELD_DENSEST 1.2
-// unless that is less than this part of its own: crowds, whose sum would outgrow a node (2 in a body however dense, and 4.8
+// unless that is less than this part of its own: crowds, whose sum would outgrow a node (2 in a body however dense, and 3.6
 // around particles on one spot under the narrowest kernel; a node has room for 8).
 #define FIELD_CROWD 0.5
 // Splashes from this number density on, as a part of a filled body's, belong to the field as the body does: pairs and rows in reach of each other.
@@ -288,7 +290,7 @@ struct Prepare {
 #define FIELD_THINNED 3.0
 // From the number density FIELD_SURE on the field encloses a particle. Below FIELD_TIP, at corners and ends of threads, it has to go on
 // beyond the particle for FIELD_BEYOND radii.
-#define FIELD_SURE 0.9
+#define FIELD_SURE 0.8
 #define FIELD_TIP 0.52
 #define FIELD_BEYOND 0.6
 // The most that one particle adds to a node: below it whatever density the host says.

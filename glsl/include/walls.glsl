@@ -73,10 +73,11 @@ vec3 body_normal_at(int side, bool whole, vec2 position, ivec2 pixel) {
 // Where on the screen the body ends around a pixel at a depth: away from the neighbours inside, towards those outside.
 vec2 outward(ivec2 pixel, float d, vec2 along) {
     vec2 sum = vec2(0.0);
-    for (int k = 0; k < 9; ++k) {
-        ivec2 step = ivec2(k % 3, k / 3) - 1;
-        vec2 body = walls_at(clamp(pixel + step, ivec2(0), ivec2(frame.size) - 1)).xy;
-        if (d < body.x || d > body.y) sum += vec2(step) / max(dot(vec2(step), vec2(step)), 1.0);
+    for (int y = -1; y <= 1; ++y) {
+        for (int x = -1; x <= 1; ++x) {
+            vec2 step = vec2(x, y), body = walls_at(clamp(pixel + ivec2(x, y), ivec2(0), ivec2(frame.size) - 1)).xy;
+            if (d < body.x || d > body.y) sum += step / max(dot(step, step), 1.0);
+        }
     }
     return dot(sum, sum) > 0.25 ? sum : along;
 }

@@ -10,7 +10,7 @@ layout(location = 0) out vec4 out_shares;
 
 void main() {
     vec2 across = vec2(ivec2(gl_FragCoord.xy) - node.xy) - part.xy;
-    vec4 along = vec4(0.0, 1.0, 2.0, 3.0) - float(node.z) - part.z, q = sqrt(dot(across, across) + along * along) / build.reach;
-    vec4 far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
-    out_shares = min(unit * (2.0 * far * far * far - 8.0 * near * near * near), FIELD_MOST_SHARE);
+    vec4 along = vec4(0.0, 1.0, 2.0, 3.0) - float(node.z) - part.z;
+    vec4 within = max(1.0 - (dot(across, across) + along * along) / (build.reach * build.reach), 0.0);
+    out_shares = min(unit, FIELD_MOST_SHARE) * within * within;
 }

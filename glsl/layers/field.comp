@@ -91,27 +91,34 @@ void main() {
     Reach r = reach_of(points.at[i]);
     vec3 part;
     ivec3 base = block_of_node(origin_node(part)), blocks = field_brick(r.last) - field_brick(r.first);
-    // The bricks that it reaches: three bits for each row along x, from the first brick's place in its block on.
+    // The bricks that it reaches: for each of three planes of them a bit a brick, four bits a row, sixteen a block; and the same in the
+    // blocks ahead on x.
+    const uint row_bits = uint((1 << FIELD_BRICK) - 1);
     vec3 x = distances(r, 0), y = distances(r, 1), z = distances(r, 2);
     ivec3 from = r.first & (FIELD_BRICK - 1);
-    uint rows[9];
+    uvec3 planes = uvec3(0u), planes_ahead = uvec3(0u);
     for (int k = 0; k < 9; ++k) {
         bvec3 reached = lessThan(x + y[k % 3] + z[k / 3], vec3(r.reach * r.reach));
-        rows[k] = (uint(reached.x) | uint(reached.y) << 1 | uint(reached.z) << 2) << from.x;
+        uint row = (uint(reached.x) | uint(reached.y) << 1 | uint(reached.z) << 2) << from.x, place = uint(FIELD_BRICK * (from.y + k % 3));
+        planes[k / 3] |= (row & row_bits) << place;
+        planes_ahead[k / 3] |= row >> FIELD_BRICK << place;
     }
-    for (uint b = 0u; b < 8u; ++b) {
-        ivec3 ahead = ivec3(b & 1u, (b >> 1) & 1u, b >> 2);
-        if (all(lessThanEqual(ahead, blocks))) {
-            uvec2 bits = uvec2(0u);
-            for (int k = 0; k < 9; ++k) {
-                ivec2 at = from.yz + ivec2(k % 3, k / 3) - FIELD_BRICK * ahead.yz;
-                bool in_block = ((at.x | at.y) & ~(FIELD_BRICK - 1)) == 0;
-                uint local = field_local(ivec3(0, at)), row = rows[k] >> (FIELD_BRICK * ahead.x) & uint((1 << FIELD_BRICK) - 1);
-                row = in_block ? row << (local & 31u) : 0u;
-                bits |= local < 32u ? uvec2(row, 0u) : uvec2(0u, row);
-            }
-            if (bits != uvec2(0u)) enter(block_of(r, b), base, bits, 8u * i + b);
+    // Of its eight blocks those that are there to be reached.
+    uint left = 1u;
+    if (blocks.x > 0) left |= left << 1;
+    if (blocks.y > 0) left |= left << 2;
+    if (blocks.z > 0) left |= left << 4;
+    while (left != 0u) {
+        uint b = uint(findLSB(left));
+        left &= left - 1u;
+        uvec3 halves = ((b & 1u) == 0u ? planes : planes_ahead) >> (8u * (b & 2u)) & 0xffffu;
+        uvec2 bits = uvec2(0u);
+        for (int k = 0; k < 3; ++k) {
+            int at = from.z + k - FIELD_BRICK * int(b >> 2);
+            uint word = halves[k] << (16 * (at & 1));
+            bits |= uvec2(at >> 1 == 0 ? word : 0u, at >> 1 == 1 ? word : 0u);
         }
+        if (bits != uvec2(0u)) enter(block_of(r, b), base, bits, 8u * i + b);
     }
 }
 #endif
@@ -156,10 +163,10 @@ void main() {
     for (uint k = 0u, brick = first; k < FIELD_NODES; ++k)
         if (field_bit(there, k)) records.at[FIELD_RECORD * brick++ + FIELD_HOME] = FIELD_NODES * slot + k + 1u;
     atomicAdd(counters.at[COUNTERS + BRICKS], count);
-    // The rectangle of groups that are one a brick.
-    uint last = first + count - 1u;
-    atomicMax(head.groups_x, min(last, MOST_GROUPS));
-    atomicMax(head.groups_y, (last - 1u) / MOST_GROUPS + 1u);
+    // The rectangle of groups that look at bricks.
+    uint last = first + count - 1u, groups = (last * FIELD_LANES + PARTICLE_GROUP - 1u) / PARTICLE_GROUP;
+    atomicMax(head.groups_x, min(groups, MOST_GROUPS));
+    atomicMax(head.groups_y, (groups - 1u) / MOST_GROUPS + 1u);
 }
 #endif
 
@@ -167,11 +174,11 @@ void main() {
 layout(set = 0, binding = 8, std430) writeonly buffer BallBlock { uvec2 at[]; } balls;
 
 // Whether the field does not enclose one of its particles.
-bool strays(vec4 point, Reach r, ivec3 base) {
+bool strays(bool asked, vec4 point, Reach r, ivec3 base) {
     // The field where it is, between nodes, and its gradient.
     float f = 0.0;
     vec3 gradient = vec3(0.0);
-    for (uint c = 0u; c < 8u; ++c) {
+    for (uint c = 0u; asked && c < 8u; ++c) {
         ivec3 step = ivec3(c & 1u, (c >> 1) & 1u, c >> 2), node = r.node + step;
         vec3 weights = mix(1.0 - r.part, r.part, bvec3(step));
         uvec4 words;
@@ -183,16 +190,16 @@ bool strays(vec4 point, Reach r, ivec3 base) {
         gradient += mix(vec3(-sum), vec3(sum), bvec3(step)) * weights.yzx * weights.zxy;
     }
     if (point.w < FIELD_TIP) f -= FIELD_BEYOND / SPLASH_RADIUS * build.ball * length(gradient);
-    return f < float(build.level);
+    return asked && f < float(build.level);
 }
 
 void main() {
     uint i = invocation();
     vec4 point = points.at[min(i, build.count - 1u)];
-    bool ball = i < build.count && point.w < 0.0;
+    bool there = i < build.count, ball = there && point.w < 0.0, asked = there && point.w > 0.0 && point.w < FIELD_SURE;
     ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
     Reach r = reach_of(vec4(point.xyz, -1.0));
-    if (i < build.count && point.w > 0.0 && point.w < FIELD_SURE) ball = strays(point, r, base);
+    ball = ball || strays(asked, point, r, base);
     vec3 x = distances(r, 0), y = distances(r, 1), z = distances(r, 2);
     for (uint k = 0u; ball && k < 8u; ++k) {
         ivec3 step = ivec3(k & 1u, (k >> 1) & 1u, k >> 2), brick = r.first + step;
@@ -216,68 +223,63 @@ void main() {
 #ifdef SCATTER
 layout(constant_id = 1) const int ACROSS = 6; // nodes that a kernel can reach on an axis
 
-// Of the three bricks along each axis those in which a row of nodes lies.
-uvec3 one_of(uvec3 first, uvec3 second, uvec3 third, int which) { return which == 0 ? first : which == 1 ? second : third; }
-
-// A block's first brick, and which it has.
-uvec3 known_block(ivec3 block, ivec3 base) {
-    uvec4 words;
-    field_slot(block, base, build.slots, words);
-    return uvec3(words[FIELD_FIRST_BRICK], field_there(words));
-}
+const int BRICKS = (ACROSS + 2) / FIELD_BRICK + 1; // in which these can be
 
 void main() {
     uint i = invocation();
     if (i >= build.count || points.at[i].w <= 0.0) return;
     vec4 point = points.at[i];
     Reach r = reach_of(point);
-    ivec3 base = ivec3(head.base_x, head.base_y, head.base_z), blocks = field_brick(r.last) - field_brick(r.first);
-    uvec3 known[8];
-    for (uint b = 0u; b < 8u; ++b) {
-        known[b] = uvec3(0u);
-        if (all(lessThanEqual(ivec3(b & 1u, (b >> 1) & 1u, b >> 2), blocks)))
-            known[b] = known_block(block_of(r, b), base);
-    }
-    // The numbers of its bricks, by x, in rows by y and z.
-    uvec3 numbers[9];
-    for (int k = 0; k < 9; ++k) {
-        ivec3 row = r.first + ivec3(0, k % 3, k / 3);
-        bvec2 ahead = notEqual(field_brick(row).yz, field_brick(r.first).yz);
-        uvec3 near = ahead.y ? (ahead.x ? known[6] : known[4]) : (ahead.x ? known[2] : known[0]);
-        uvec3 far = ahead.y ? (ahead.x ? known[7] : known[5]) : (ahead.x ? known[3] : known[1]);
-        for (int x = 0; x < 3; ++x) {
-            ivec3 brick = row + ivec3(x, 0, 0);
-            uvec3 block = field_brick(brick).x == field_brick(r.first).x ? near : far;
-            bool there = all(lessThanEqual(brick, r.last)) && field_bit(block.yz, field_local(brick));
-            numbers[k][x] = there ? block.x + field_before(block.yz, field_local(brick)) : 0u;
-        }
-    }
-    float unit = unit_of(point), per_reach = 1.0 / build.reach;
+    ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
+    float unit = min(unit_of(point), FIELD_MOST_SHARE), per_square = 1.0 / (build.reach * build.reach);
     // Nodes from the first that it can reach on, in spacings from the point, and among those of its bricks.
-    ivec3 low = ivec3(floor(r.part - build.reach)) + 1, at = r.node + low - (r.first << FIELD_BRICK_BITS);
+    ivec3 low = ivec3(floor(r.part - build.reach)) + 1, first = field_brick(r.node + low), at = r.node + low - (first << FIELD_BRICK_BITS);
     vec3 offset = vec3(low) - r.part;
+    // The numbers of these, x before y before z. Mostly they are one block's.
+    uint numbers[BRICKS * BRICKS * BRICKS];
+    ivec3 block = field_brick(first);
+    uvec4 words;
+    field_slot(block, base, build.slots, words);
+    for (int k = 0; k < BRICKS * BRICKS * BRICKS; ++k) {
+        ivec3 brick = first + ivec3(k % BRICKS, k / BRICKS % BRICKS, k / (BRICKS * BRICKS));
+        if (field_brick(brick) != block) {
+            block = field_brick(brick);
+            field_slot(block, base, build.slots, words);
+        }
+        numbers[k] = field_number(words, field_local(brick));
+    }
+    // Two nodes that share a word at a time, from the word of the first on; how near those of a word are to the point on x.
+    int word = at.x >> 1;
+    float from = offset.x - float(at.x & 1), nearest[ACROSS / 2 + 1];
+    for (int pair = 0; pair <= ACROSS / 2; ++pair) {
+        float x = min(abs(from + float(2 * pair)), abs(from + float(2 * pair + 1)));
+        nearest[pair] = 1.0 - x * x * per_square;
+    }
     for (int z = 0; z < ACROSS; ++z) {
-        int z_brick = (at.z + z) >> FIELD_BRICK_BITS;
-        uvec3 plane[3];
-        for (int y = 0; y < 3; ++y) plane[y] = one_of(numbers[y], numbers[3 + y], numbers[6 + y], z_brick);
+        uint plane[BRICKS * BRICKS];
+        for (int k = 0; k < BRICKS * BRICKS * BRICKS; ++k) {
+            if (k / (BRICKS * BRICKS) == (at.z + z) >> FIELD_BRICK_BITS) plane[k % (BRICKS * BRICKS)] = numbers[k];
+        }
+        // The words that it reaches, a bit each; FIELD_ROW_WORDS for a row.
+        float dz = offset.z + float(z);
+        uint reached = 0u;
         for (int y = 0; y < ACROSS; ++y) {
-            vec2 yz = offset.yz + vec2(y, z);
-            float row = dot(yz, yz);
-            ivec2 row_at = at.yz + ivec2(y, z);
-            if (row >= build.reach * build.reach) continue;
-            uvec3 row_numbers = one_of(plane[0], plane[1], plane[2], row_at.x >> FIELD_BRICK_BITS);
-            // Two nodes that share a word at a time, from the one that the first shares its word with.
-            for (int pair = 0; pair <= ACROSS / 2; ++pair) {
-                ivec3 own = ivec3((at.x & ~1) + 2 * pair, row_at);
-                vec2 dx = offset.x + float(own.x - at.x) + vec2(0.0, 1.0), q = sqrt(row + dx * dx) * per_reach;
-                vec2 far = max(1.0 - q, 0.0), near = max(0.5 - q, 0.0);
-                vec2 weight = min(unit * (2.0 * far * far * far - 8.0 * near * near * near), FIELD_MOST_SHARE);
-                uvec2 share = rounded(weight);
-                int b = own.x >> FIELD_BRICK_BITS;
-                uint number = b == 0 ? row_numbers.x : b == 1 ? row_numbers.y : row_numbers.z, both = share.x | share.y << 16;
-                // Without a number there was no room for the brick.
-                if (both > 0u && number > 0u) atomicAdd(nodes.at[FIELD_NODE_WORDS * number + field_local(own) / 2u], both);
-            }
+            float dy = offset.y + float(y), across = (dy * dy + dz * dz) * per_square;
+            for (int pair = 0; pair <= ACROSS / 2; ++pair) reached |= uint(nearest[pair] > across) << (4 * y + pair);
+        }
+        while (reached != 0u) {
+            int k = findLSB(reached), y = k >> 2, pair = k & 3;
+            reached &= reached - 1u;
+            vec2 x = from + float(2 * pair) + vec2(0.0, 1.0);
+            float dy = offset.y + float(y);
+            vec2 within = max(1.0 - (x * x + (dy * dy + dz * dz)) * per_square, 0.0);
+            uvec2 share = rounded(unit * within * within);
+            ivec3 own = ivec3(2 * (word + pair), at.yz + ivec2(y, z)), brick = own >> FIELD_BRICK_BITS;
+            int which = brick.x + BRICKS * brick.y;
+            uint number = plane[0];
+            for (int b = 1; b < BRICKS * BRICKS; ++b) number = which == b ? plane[b] : number;
+            // Without a number there was no room for the brick.
+            if (number > 0u) atomicAdd(nodes.at[FIELD_NODE_WORDS * number + field_local(own) / 2u], share.x | share.y << 16);
         }
     }
 }
@@ -286,43 +288,67 @@ void main() {
 #ifdef FINISH
 layout(set = 0, binding = 8, std430) writeonly buffer CellBlock { uint at[]; } cells;
 
-// Of a brick's nodes, those up to one before and two beyond them on each axis; and of the corners of its cells.
-const uint AROUND = FIELD_BRICK + 3u, CORNERS = FIELD_BRICK + 1u;
-shared uint numbers[27];                          // of the bricks around it
-shared uint sums[AROUND * AROUND * AROUND];
-shared uint corners[CORNERS * CORNERS * CORNERS]; // four bytes each: what it holds, and its gradient
-shared uint found[2];                             // whether there are corners outside, and inside
-shared uint surface[4];                           // one bit for each cell that holds some; one for each node that is inside
-shared uint first_cell;
+// A group takes several bricks, FIELD_LANES invocations each. Of a brick's nodes those up to two before and beyond them on x, and one before and two
+// beyond on the other axes, as rows of words of two each, in rooms of a power of two; and the corners of its cells.
+const uint BRICKS_AT_ONCE = PARTICLE_GROUP / FIELD_LANES, AROUND = FIELD_BRICK + 3u, ROW_WORDS = 4u, ROW_ROOM = 8u, CORNERS = FIELD_BRICK + 1u;
+const uint WORDS = ROW_WORDS * ROW_ROOM * AROUND, ALL_CORNERS = CORNERS * CORNERS * CORNERS;
+shared uint numbers[BRICKS_AT_ONCE][27]; // of the bricks around it
+shared uint sums[BRICKS_AT_ONCE][WORDS];
+shared uint corners[BRICKS_AT_ONCE][ALL_CORNERS]; // four bytes each: what it holds, and its gradient
+shared uint found[BRICKS_AT_ONCE][2];             // whether there are corners outside, and inside
+shared uint surface[BRICKS_AT_ONCE][2];           // one bit for each cell that holds some
+shared uint inside[BRICKS_AT_ONCE][2];            // one for each node that is inside
+shared uint first_cell[BRICKS_AT_ONCE];
+uint own; // which of the group's bricks it is
 
-uint corner_at(uvec3 local) { return local.x + CORNERS * (local.y + CORNERS * local.z); }
-uint sum_index(uvec3 node) { return node.x + AROUND * (node.y + AROUND * node.z); }
-int sum_at(ivec3 node) { return int(sums[sum_index(uvec3(node))]); }
+uint corner_at(uvec3 place) { return place.x + CORNERS * (place.y + CORNERS * place.z); }
+// By products, since whole numbers divide lane by lane on CPUs; i below 1024.
+uvec3 corner_from(uint i) {
+    uint y = i * 205u >> 10, z = y * 205u >> 10;
+    return uvec3(i - CORNERS * y, y - CORNERS * z, z);
+}
+uint sum_index(uvec3 word) { return word.x + ROW_WORDS * (word.y + ROW_ROOM * word.z); }
 
-void find_brick(ivec3 own, ivec3 step) {
-    ivec3 brick = own + step;
-    uvec4 words;
-    field_slot(field_brick(brick), ivec3(head.base_x, head.base_y, head.base_z), build.slots, words);
-    numbers[step.x + 1 + 3 * (step.y + 1 + 3 * (step.z + 1))] = field_number(words, field_local(brick));
+// Reads the i-th word around the brick, the first of which begins two nodes before the brick's own. Whether corners of its cells among these are
+// outside, and inside.
+bvec2 read_sums(uint i) {
+    uvec3 word = uvec3(i, i / ROW_WORDS, i / (ROW_WORDS * ROW_ROOM)) & uvec3(ROW_WORDS - 1u, ROW_ROOM - 1u, ROW_ROOM - 1u);
+    uvec3 at = uvec3(2u * word.x, word.yz + 1u) + FIELD_BRICK - 2u, brick = at >> FIELD_BRICK_BITS;
+    uint number = numbers[own][brick.x + 3u * (brick.y + 3u * brick.z)], both = nodes.at[FIELD_NODE_WORDS * number + field_local(ivec3(at)) / 2u];
+    sums[own][i] = both;
+    bvec2 within = greaterThanEqual(uvec2(both & 0xffffu, both >> 16), uvec2(build.level));
+    bool corner = word.x > 0u && all(greaterThan(word.yz, uvec2(0u))) && all(lessThanEqual(word.yz, uvec2(CORNERS))), pair = word.x + 1u < ROW_WORDS;
+    return bvec2(corner && (!within.x || (pair && !within.y)), corner && (within.x || (pair && within.y)));
 }
 
-// Reads the sum of a node, by its place around the brick.
-uint read_sum(uvec3 node) {
-    uvec3 at = node + FIELD_BRICK - 1u, brick = at >> FIELD_BRICK_BITS;
-    uint word = nodes.at[FIELD_NODE_WORDS * numbers[brick.x + 3u * (brick.y + 3u * brick.z)] + field_local(ivec3(at)) / 2u];
-    uint sum = word >> (16u * (at.x & 1u)) & 0xffffu;
-    sums[sum_index(node)] = sum;
-    return sum;
+// The sum of a node, by its place from the brick's first on, in a row so many words further on.
+uint sum_at(uvec3 node, uint row) { return sums[own][sum_index(uvec3(node.x / 2u + 1u, node.yz + 1u)) + row] >> (16u * (node.x & 1u)) & 0xffffu; }
+// And those of the nodes before it, of itself, and behind it on x.
+uvec3 sums_along(uvec3 node) {
+    uint i = sum_index(uvec3((node.x + 1u) / 2u, node.yz + 1u)), first = sums[own][i], second = sums[own][i + 1u];
+    return (node.x & 1u) == 0u ? uvec3(first >> 16, second & 0xffffu, second >> 16) : uvec3(first & 0xffffu, first >> 16, second & 0xffffu);
 }
 
-// A node, by its place around the brick.
-uint packed_node(ivec3 node) {
-    uint held = min(uint(sum_at(node)) * FIELD_HALF / build.level, 255u);
-    vec3 gradient = vec3(sum_at(node + ivec3(1, 0, 0)) - sum_at(node - ivec3(1, 0, 0)), sum_at(node + ivec3(0, 1, 0)) - sum_at(node - ivec3(0, 1, 0)),
-                         sum_at(node + ivec3(0, 0, 1)) - sum_at(node - ivec3(0, 0, 1))) / (2.0 * FIELD_STEEPEST * FIELD_ONE);
+// A node, by its place from the brick's first on.
+uint packed_node(uvec3 node) {
+    uvec3 along = sums_along(node);
+    // By a quotient that is near, since whole numbers divide lane by lane on CPUs.
+    uint above = along.y * FIELD_HALF, held = rounded(float(int(above)) / float(int(build.level)));
+    if (held * build.level > above) --held;
+    const uint y = ROW_WORDS, z = ROW_WORDS * ROW_ROOM;
+    ivec3 before = ivec3(along.x, sum_at(node, 0u - y), sum_at(node, 0u - z)), behind = ivec3(along.z, sum_at(node, y), sum_at(node, z));
+    vec3 gradient = vec3(behind - before) / (2.0 * FIELD_STEEPEST * FIELD_ONE);
     // What is steeper keeps its direction.
     gradient /= max(1.0, max(abs(gradient.x), max(abs(gradient.y), abs(gradient.z))));
-    return held | packSnorm4x8(vec4(gradient, 0.0)) << 8;
+    uvec3 slope = uvec3(whole(127.0 * gradient)) & 0xffu;
+    return min(held, 255u) | slope.x << 8 | slope.y << 16 | slope.z << 24;
+}
+
+// Which nodes of a row of corners are inside, a bit each: all, of two beside each other both, and either of them.
+uvec3 row_of(uint y, uint z) {
+    uint row = 0u;
+    for (uint x = 0u; x < CORNERS; ++x) row |= (corners[own][corner_at(uvec3(x, y, z))] & FIELD_HALF) / FIELD_HALF << x;
+    return uvec3(row, row & row >> 1, row | row >> 1) & ((1u << FIELD_BRICK) - 1u);
 }
 
 // The k-th bytes of four words.
@@ -330,71 +356,82 @@ uint bytes(uvec4 words, uint k) {
     uvec4 b = words >> (8u * k) & 0xffu;
     return b.x | b.y << 8 | b.z << 16 | b.w << 24;
 }
+void write_cell(uint cell, uint local) {
+    uint first = corner_at(uvec3(field_from_local(local))), word = FIELD_CELL_RECORD * cell;
+    for (uint z = 0u; z < 2u; ++z) {
+        uvec4 four = uvec4(corners[own][first], corners[own][first + 1u], corners[own][first + CORNERS], corners[own][first + CORNERS + 1u]);
+        for (uint b = 0u; b < 4u; ++b) cells.at[word + 2u * b + z] = bytes(four, b);
+        first += CORNERS * CORNERS;
+    }
+}
 
-// One group a brick, one invocation a cell.
 void main() {
-    uint number = group_index() + 1u, k = gl_LocalInvocationIndex, record = FIELD_RECORD * number;
-    if (number > min(head.bricks, build.capacity - 1u)) return;
-    uint home = records.at[record + FIELD_HOME] - 1u, slot = home / FIELD_NODES;
-    if (home == 0xffffffffu) return; // a number that no block has got
-    ivec3 own = (field_place(slot) << FIELD_BRICK_BITS) + field_from_local(home);
-    if (k < 8u) find_brick(own, ivec3(k & 1u, (k >> 1) & 1u, k >> 2));
-    if (k < 4u) surface[k] = 0u;
-    if (k < 2u) found[k] = 0u;
-    barrier();
-    for (uint i = k; i < CORNERS * CORNERS * CORNERS; i += FIELD_NODES) {
-        uint inside = uint(read_sum(uvec3(i % CORNERS, i / CORNERS % CORNERS, i / (CORNERS * CORNERS)) + 1u) >= build.level);
-        if (found[inside] == 0u) found[inside] = 1u;
+    own = gl_LocalInvocationIndex / FIELD_LANES;
+    uint lane = gl_LocalInvocationIndex % FIELD_LANES, number = invocation() / FIELD_LANES + 1u;
+    if (number > min(head.bricks, build.capacity - 1u)) number = 0u;
+    // A number that no block has got is nothing, as is the empty brick's.
+    uint record = FIELD_RECORD * number, home = records.at[record + FIELD_HOME] - 1u, slot = home / FIELD_NODES;
+    bool there = home != 0xffffffffu;
+    if (lane < 2u) {
+        found[own][lane] = 0u;
+        surface[own][lane] = 0u;
+        inside[own][lane] = 0u;
+    }
+    for (uint i = there ? lane : 27u; i < 27u; i += FIELD_LANES) {
+        ivec3 brick = (field_place(slot) << FIELD_BRICK_BITS) + field_from_local(home) + ivec3(i % 3u, i / 3u % 3u, i / 9u) - 1;
+        uvec4 words;
+        field_slot(field_brick(brick), ivec3(head.base_x, head.base_y, head.base_z), build.slots, words);
+        numbers[own][i] = field_number(words, field_local(brick));
     }
     barrier();
-    if (found[0] + found[1] == 1u) {
-        if (k < 2u) records.at[record + FIELD_INSIDE + k] = found[1] * 0xffffffffu;
-        return;
+    bvec2 some = bvec2(false);
+    for (uint i = there ? lane : WORDS; i < WORDS; i += FIELD_LANES) {
+        bvec2 more = read_sums(i);
+        some = bvec2(some.x || more.x, some.y || more.y);
     }
-    ivec3 step = ivec3(k % 3u, k / 3u % 3u, k / 9u) - 1;
-    if (k < 27u && any(lessThan(step, ivec3(0)))) find_brick(own, step);
+    if (some.x) found[own][0] = 1u;
+    if (some.y) found[own][1] = 1u;
     barrier();
-    for (uint i = k; i < AROUND * AROUND * AROUND; i += FIELD_NODES) {
-        uvec3 node = uvec3(i % AROUND, i / AROUND % AROUND, i / (AROUND * AROUND));
-        if (any(equal(node, uvec3(0u))) || any(equal(node, uvec3(AROUND - 1u)))) read_sum(node);
+    bool mixed = found[own][0] + found[own][1] == 2u;
+    if (there && !mixed && lane < 2u) records.at[record + FIELD_INSIDE + lane] = found[own][1] * 0xffffffffu;
+    for (uint i = mixed ? lane : ALL_CORNERS; i < ALL_CORNERS; i += FIELD_LANES) corners[own][i] = packed_node(corner_from(i));
+    barrier();
+    // Two rows of its cells, and the nodes before these.
+    uint holding = 0u, within = 0u;
+    for (uint i = mixed ? 0u : 2u; i < 2u; ++i) {
+        uvec2 at = uvec2(2u * (lane % 2u) + i, lane / 2u);
+        uvec3 a = row_of(at.x, at.y), b = row_of(at.x + 1u, at.y), c = row_of(at.x, at.y + 1u), d = row_of(at.x + 1u, at.y + 1u);
+        holding |= ((a.z | b.z | c.z | d.z) & ~(a.y & b.y & c.y & d.y)) << (FIELD_BRICK * i);
+        within |= a.x << (FIELD_BRICK * i);
+    }
+    if (mixed) {
+        atomicOr(surface[own][lane / 4u], holding << (8u * (lane % 4u)));
+        atomicOr(inside[own][lane / 4u], within << (8u * (lane % 4u)));
     }
     barrier();
-    for (uint i = k; i < CORNERS * CORNERS * CORNERS; i += FIELD_NODES)
-        corners[i] = packed_node(ivec3(i % CORNERS, i / CORNERS % CORNERS, i / (CORNERS * CORNERS)) + 1);
-    barrier();
-    uint first = corner_at(uvec3(field_from_local(k)));
-    uvec4 low = uvec4(corners[first], corners[first + 1u], corners[first + CORNERS], corners[first + CORNERS + 1u]);
-    first += CORNERS * CORNERS;
-    uvec4 high = uvec4(corners[first], corners[first + 1u], corners[first + CORNERS], corners[first + CORNERS + 1u]);
-    uint all_inside = (low.x & low.y & low.z & low.w & high.x & high.y & high.z & high.w) & FIELD_HALF,
-         any_inside = (low.x | low.y | low.z | low.w | high.x | high.y | high.z | high.w) & FIELD_HALF;
-    bool here = all_inside != any_inside;
-    if (here) atomicOr(surface[k >> 5], 1u << (k & 31u));
-    if ((low.x & FIELD_HALF) != 0u) atomicOr(surface[2u + (k >> 5)], 1u << (k & 31u));
-    barrier();
-    if (k < 2u) records.at[record + FIELD_INSIDE + k] = surface[2u + k];
-    uvec2 bits = uvec2(surface[0], surface[1]);
-    if (k == 0u) {
-        uint count = field_before(bits, FIELD_NODES - 1u) + uint(field_bit(bits, FIELD_NODES - 1u));
-        first_cell = atomicAdd(counters.at[COUNTERS + CELLS], count); // its numbers follow from the count
+    if (mixed && lane < 2u) records.at[record + FIELD_INSIDE + lane] = inside[own][lane];
+    uvec2 bits = uvec2(surface[own][0], surface[own][1]);
+    if (mixed && lane == 0u) {
+        uint count = uint(bitCount(bits.x) + bitCount(bits.y)), first = atomicAdd(counters.at[COUNTERS + CELLS], count); // its numbers follow from the count
         // Without room for all there are none.
-        if (first_cell + count > build.cell_capacity) {
+        if (first + count > build.cell_capacity) {
             atomicAdd(counters.at[COUNTERS + CELLS_LEFT_OUT], count);
-            first_cell = build.cell_capacity;
+            first = build.cell_capacity;
         } else {
             uint local = home % FIELD_NODES;
             atomicOr(table.at[FIELD_SLOT * slot + FIELD_SURFACE + (local >> 5)], 1u << (local & 31u));
-            records.at[record + FIELD_FIRST_CELL] = first_cell;
+            records.at[record + FIELD_FIRST_CELL] = first;
             records.at[record + FIELD_CELLS] = bits.x;
             records.at[record + FIELD_CELLS + 1u] = bits.y;
         }
+        first_cell[own] = first;
     }
     barrier();
-    if (!here || first_cell == build.cell_capacity) return;
-    uint cell = FIELD_CELL_RECORD * (first_cell + field_before(bits, k));
-    for (uint b = 0u; b < 4u; ++b) {
-        cells.at[cell + 2u * b] = bytes(low, b);
-        cells.at[cell + 2u * b + 1u] = bytes(high, b);
+    if (!mixed || first_cell[own] == build.cell_capacity) return;
+    uint cell = first_cell[own] + field_before(bits, 8u * lane);
+    while (holding != 0u) {
+        write_cell(cell++, 8u * lane + uint(findLSB(holding)));
+        holding &= holding - 1u;
     }
 }
 #endif

@@ -7,7 +7,7 @@
 #include "frame.glsl"
 #include "groups.glsl"
 #include "field.glsl"
-layout(local_size_x = PARTICLE_GROUP) in; // one group a brick, one invocation a cell
+layout(local_size_x = PARTICLE_GROUP) in;
 layout(push_constant) uniform PushBlock {
     uint capacity; // bricks that there is room for
     float spacing; // of the nodes, in particle radii
@@ -55,19 +55,30 @@ void cover(vec3 low, vec3 high) {
 }
 
 void main() {
-    uint number = group_index() + 1u, cell = gl_LocalInvocationIndex;
+    // Of a brick's invocations each takes eight cells: few hold some of the surface.
+    uint number = invocation() / FIELD_LANES + 1u, k = invocation() % FIELD_LANES;
     if (number > min(head.bricks, push.capacity - 1u)) return;
     uint record = FIELD_RECORD * number, home = records.at[record + FIELD_HOME] - 1u;
     if (home == 0xffffffffu) return; // a number that no block has got
     ivec3 ahead = field_place(home / FIELD_NODES) - base_block();
     vec3 brick = vec3(FIELD_BRICK * (FIELD_BRICK * ahead + field_from_local(home)));
-    vec3 low = brick + vec3(field_from_local(cell));
-    if (field_bit(uvec2(records.at[record + FIELD_CELLS], records.at[record + FIELD_CELLS + 1u]), cell)) cover(low, low + 1.0);
-    uint entry = cell == 0u ? records.at[record + FIELD_FIRST_BALL] : 0u;
-    for (uint i = 0u; i < FIELD_MOST_BALLS && entry != 0u; ++i) {
-        uvec2 ball = balls.at[entry - 1u];
-        vec3 center = brick + field_ball(ball.x);
-        cover(center - push.ball, center + push.ball);
-        entry = ball.y;
+    uint surface = records.at[record + FIELD_CELLS + k / 4u] >> (8u * (k % 4u)) & 0xffu;
+    uint entry = k == 0u ? records.at[record + FIELD_FIRST_BALL] : 0u, left = FIELD_MOST_BALLS;
+    // Cells, then balls: one place in the code for both.
+    while (surface != 0u || (entry != 0u && left > 0u)) {
+        vec3 low, high;
+        if (surface != 0u) {
+            low = brick + vec3(field_from_local(8u * k + uint(findLSB(surface))));
+            high = low + 1.0;
+            surface &= surface - 1u;
+        } else {
+            uvec2 ball = balls.at[entry - 1u];
+            vec3 center = brick + field_ball(ball.x);
+            low = center - push.ball;
+            high = center + push.ball;
+            entry = ball.y;
+            --left;
+        }
+        cover(low, high);
     }
 }

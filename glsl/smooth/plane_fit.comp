@@ -36,14 +36,16 @@ shared uint occupied;
 
 // The window's pixels of a whole group, read once.
 void load_tile(ivec2 origin, ivec2 size, int layer) {
-    for (int k = int(gl_LocalInvocationIndex); k < WIDE * TALL; k += int(gl_WorkGroupSize.x * gl_WorkGroupSize.y)) {
-        ivec2 p = origin + ivec2(k % WIDE, k / WIDE);
-        vec4 entry = vec4(0.0, 0.0, 0.0, NOWHERE);
-        if (all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, size))) {
-            float d = texelFetch(depth_in, ivec3(p, layer), 0).x;
-            if (d > 0.0) entry = vec4(decode_normal(texelFetch(normal_raw, ivec3(p, layer), 0).x), d);
+    for (int y = int(gl_LocalInvocationID.y); y < TALL; y += int(gl_WorkGroupSize.y)) {
+        for (int x = int(gl_LocalInvocationID.x); x < WIDE; x += int(gl_WorkGroupSize.x)) {
+            ivec2 p = origin + ivec2(x, y);
+            vec4 entry = vec4(0.0, 0.0, 0.0, NOWHERE);
+            if (all(greaterThanEqual(p, ivec2(0))) && all(lessThan(p, size))) {
+                float d = texelFetch(depth_in, ivec3(p, layer), 0).x;
+                if (d > 0.0) entry = vec4(decode_normal(texelFetch(normal_raw, ivec3(p, layer), 0).x), d);
+            }
+            tile[y * WIDE + x] = entry;
         }
-        tile[k] = entry;
     }
 }
 

@@ -10,12 +10,12 @@ use crate::{
     parameters::parameters,
     passes::{Points, per_particle},
     plan::{Call, Groups, Plan, Target},
-    prepare::rest_density,
+    prepare::density::lattice,
     scene::Scene,
     shader::{
         FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_LIST_COMP, FIELD_MARK_COMP,
         FIELD_MOST_BRICKS, FIELD_NODE_WORDS, FIELD_NODES, FIELD_NUMBER_COMP, FIELD_ONE, FIELD_RECORD,
-        FIELD_SCATTER_COMP, FIELD_SLOT, FieldBuild, FieldHead, PARTICLE_GROUP, SPLASH_RADIUS, Shader,
+        FIELD_SCATTER_COMP, FIELD_SLOT, FieldBuild, FieldHead, SPLASH_RADIUS, Shader,
     },
     space::power_of_two,
 };
@@ -29,13 +29,23 @@ parameters! {
         /// Distance of the grid's nodes; ours, by measurement: half as much changes little and has eight times the nodes
         spacing: f32 = 2.0, "particle radii", "1.5 to 3" => |s| (1.5..=3.0).contains(s);
         /// How far a particle reaches; ours, by measurement
-        kernel_radius: f32 = 5.5, "particle radii", "3 to 6" => |k| (3.0..=6.0).contains(k);
+        kernel_radius: f32 = 4.5, "particle radii", "2.5 to 5" => |k| (2.5..=5.0).contains(k);
         /// Density of the surface, as a part of a filled body's; ours: it lies one radius above the outermost particles
         level: f32 = 0.57, "", "0.05 to 0.95" => |l| (0.05..=0.95).contains(l);
         /// What there is room for in proportion to the particles, whose own volume is (2 r)³ each: bricks of 64 nodes. Bricks
         /// beyond it are left out, and counted
         room: f32 = 5.0, "volumes of the particles", "1 to 1000" => |r| (1.0..=1000.0).contains(r);
     }
+}
+
+/// The field's kernel, 1 at the centre; `q`: distance / support.
+pub(crate) fn kernel(q: f64) -> f64 {
+    (1.0 - q * q).max(0.0).powi(2)
+}
+
+/// Its sum over the particles of a filled body, the one at its centre included; `support` in particle radii.
+pub(crate) fn rest(support: f64) -> f64 {
+    lattice(support).map(|point| kernel(point.length() / support)).sum()
 }
 
 /// Bricks that there is room for in any case, as far as so many particles can reach: 27 each.
@@ -101,7 +111,7 @@ impl Field {
             ball_capacity: (count / 2).max(LEAST_BALLS).min(8 * count).next_multiple_of(2) as u32,
             spacing: self.spacing * (radius * unit),
             reach: self.kernel_radius / self.spacing,
-            unit: (f64::from(FIELD_ONE) / rest_density(f64::from(self.kernel_radius))) as f32,
+            unit: (f64::from(FIELD_ONE) / rest(f64::from(self.kernel_radius))) as f32,
             ball: SPLASH_RADIUS / self.spacing,
             level: (self.level * FIELD_ONE as f32).round() as u32,
             origin_x: origin.x,
@@ -202,6 +212,3 @@ impl Building {
         Call::compute(shader).update("table", self.table).push_all(&self.build).counting(&COUNTED)
     }
 }
-
-// One invocation a node.
-const _: () = assert!(FIELD_NODES == PARTICLE_GROUP);

@@ -25,7 +25,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, Mat3, Vec3};
 
-pub(crate) use density::rest_density;
 pub use density::{DensityField, classes_over, classify, densities};
 pub use device::{DeviceCount, DeviceIds, DevicePositions};
 pub(crate) use device::{Kept, Words};

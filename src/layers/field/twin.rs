@@ -1,8 +1,7 @@
 //! Twin of `glsl/layers/field.comp`: the density field in 64 bits, from its formula; and what the device has built, read back.
 
-use super::Field;
+use super::{Field, kernel, rest};
 use crate::{
-    prepare::density::{rest_density, spline},
     shader::{
         FIELD_BALL, FIELD_BALL_BELOW, FIELD_BALL_BITS, FIELD_BALL_STEPS, FIELD_BALLS, FIELD_BEYOND, FIELD_BRICK,
         FIELD_CELL_RECORD, FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_FIRST_BALL, FIELD_FIRST_BRICK,
@@ -42,7 +41,7 @@ impl Lattice {
             spacing: f64::from(field.spacing * radius),
             support: f64::from(field.kernel_radius) * f64::from(radius),
             ball: f64::from(SPLASH_RADIUS) * f64::from(radius),
-            rest: rest_density(f64::from(field.kernel_radius)),
+            rest: rest(f64::from(field.kernel_radius)),
             level: f64::from(field.level),
         }
     }
@@ -60,7 +59,7 @@ impl Lattice {
         }
         let rim = (FIELD_RIM - FIELD_THINNED * (FIELD_RIM - point.w)).max(FIELD_THIN);
         let divisor = density.min(f64::from(rim.min(FIELD_DENSEST))).max(f64::from(FIELD_CROWD) * density);
-        spline(position.distance(point.truncate().as_dvec3()) / self.support) / (self.rest * divisor)
+        kernel(position.distance(point.truncate().as_dvec3()) / self.support) / (self.rest * divisor)
     }
 
     /// Each node that a point reaches, with the field there and how many points that is of.
