@@ -48,7 +48,6 @@ layout(constant_id = 1) const uint COUNTERS = 0; // slot of its first counter
 #define EACH_BOOL bool
 #define OF(each, c) each
 #define LESS(a, b) ((a) < (b))
-#define ANY(each) each
 #else
 #define AT_ONCE SHAPE_RUN
 #define EACH vec4
@@ -56,7 +55,6 @@ layout(constant_id = 1) const uint COUNTERS = 0; // slot of its first counter
 #define EACH_BOOL bvec4
 #define OF(each, c) each[c]
 #define LESS(a, b) lessThan(a, b)
-#define ANY(each) any(each)
 #endif
 
 uint input_index(uint k) { return RELATION_TABLE ? k : entry_at(k); }

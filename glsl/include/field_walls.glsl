@@ -49,13 +49,15 @@ struct Block {
     uvec2 surfaces;
     uvec2 balls;
 };
+// Read once: CPUs read a buffer lane by lane.
+ivec3 base = base_block();
 const Block NOWHERE = Block(vec3(NONE), 0u, uvec2(0u), uvec2(0u), uvec2(0u));
 void look_up(inout Block b, vec3 x) {
     vec3 low = BLOCK_EDGE * floor(x / BLOCK_EDGE);
     if (low != b.low) {
         b.low = low;
         uvec4 words;
-        uint slot = field_slot(base_block() + whole(b.low / BLOCK_EDGE), base_block(), push.slots, words);
+        uint slot = field_slot(base + whole(b.low / BLOCK_EDGE), base, push.slots, words);
         b.first = words[FIELD_FIRST_BRICK];
         b.there = field_there(words);
         words = directory_texel(FIELD_SLOT_TEXELS * slot + FIELD_SURFACE / 4u);
@@ -152,7 +154,9 @@ bool falls(vec4 h, inout bool own, out float root) {
         if (c0 + middle * (c1 + middle * (c2 + middle * c3)) < 0.0) to = middle;
         else from = middle;
     }
-    root = 0.5 * (from + to);
+    // So near it is as good as straight.
+    float before = c0 + from * (c1 + from * (c2 + from * c3)), behind = c0 + to * (c1 + to * (c2 + to * c3));
+    root = mix(from, to, clamp(before / max(before - behind, 1e-20), 0.0, 1.0));
     return found;
 }
 
@@ -225,10 +229,12 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
     bool own = false, first = true, met = false;
     uint steps = 0u;
     while (!met && c.t < min(reach, wall.t) && steps < FIELD_STEPS) {
-        // On to a cell that holds the surface: block by block, in those with bricks to stop in brick by brick, in those cell by cell.
+        // On to a cell that holds the surface, from outside also to a brick into which balls reach: block by block, in those with bricks to stop
+        // in brick by brick, in those cell by cell. Balls come after the loop, for CPUs look at a first one whether there is one or not.
         bool at_surface = false;
         uint cell = 0u, ball = 0u;
-        while (!at_surface && c.t < min(reach, wall.t) && steps < FIELD_STEPS) {
+        vec3 brick = vec3(0.0);
+        while (!at_surface && (inside || ball == 0u) && c.t < min(reach, wall.t) && steps < FIELD_STEPS) {
             ++steps;
             look_up(block, c.cell);
             uvec2 stops = inside ? block.surfaces : block.surfaces | block.balls;
@@ -237,12 +243,12 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
             uvec4 words = stop ? brick_words(block.first + field_before(block.there, k)) : uvec4(0u);
             bool surface = stop && field_bit(block.surfaces, k);
             ball = words[FIELD_FIRST_BALL];
-            vec3 brick = BRICK_EDGE * floor(c.cell / BRICK_EDGE);
-            if (!inside) meet_balls(ball, brick, x, dir, wall);
+            brick = BRICK_EDGE * floor(c.cell / BRICK_EDGE);
             uvec2 bits = surface ? words.xy : uvec2(0u);
             at_surface = cross_cubes(c, stop, brick, BRICK_EDGE, bits, k, first);
             if (at_surface) cell = words[FIELD_FIRST_CELL] + field_before(bits, k);
         }
+        if (!inside) meet_balls(ball, brick, x, dir, wall);
         if (at_surface) {
             uvec4 corners = cell_words(cell, 0u);
             vec4 low = held(corners.x), high = held(corners.y);

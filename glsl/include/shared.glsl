@@ -278,16 +278,16 @@ struct Prepare {
 #define FIELD_STEEPEST 0.75
 // A particle whose number density exceeds that of a filled body so many times counts as one of so much,
 #define FIELD_DENSEST 1.2
-// unless that is less than this part of its own: crowds, whose sum would outgrow a node (2 in a body however dense, and 3.6
+// unless that is less than this part of its own: crowds, whose sum would outgrow a node (2.5 in a body however dense, and 4.4
 // around particles on one spot under the narrowest kernel; a node has room for 8).
-#define FIELD_CROWD 0.5
+#define FIELD_CROWD 0.4
 // Splashes from this number density on, as a part of a filled body's, belong to the field as the body does: pairs and rows in reach of each other.
 #define FIELD_JOINS 0.4
 // Below the number density FIELD_RIM particles lie at the edge of a sheet. They count as less dense than they are, down to FIELD_THIN: the
 // surface would draw back there.
 #define FIELD_RIM 0.65
-#define FIELD_THIN 0.45
-#define FIELD_THINNED 3.0
+#define FIELD_THIN 0.42
+#define FIELD_THINNED 3.8
 // From the number density FIELD_SURE on the field encloses a particle. Below FIELD_TIP, at corners and ends of threads, it has to go on
 // beyond the particle for FIELD_BEYOND radii.
 #define FIELD_SURE 0.8
@@ -337,8 +337,8 @@ struct Prepare {
 #define FIELD_STEPS 4096
 // Balls of one brick that are looked at.
 #define FIELD_MOST_BALLS 4096
-// Halvings that narrow a root, of the way through a cell.
-#define FIELD_HALVINGS 18
+// Halvings that narrow a root, of the way through a cell, before it is taken from a straight line.
+#define FIELD_HALVINGS 9
 // How far from its wall a ray goes on, on its own side, in spacings.
 #define FIELD_NUDGE 0.002
 // What rounding leaves of a ball's square, as a part of it, and of the way from one to itself, in spacings.

@@ -44,8 +44,24 @@ layout(constant_id = 1) const bool ORIGIN_ON_DEVICE = false; // the liquid's own
 #ifndef FINISH
 #include "field_reach.glsl"
 
+// Which of eight, two on each axis, lies how far ahead.
+ivec3 ahead_of(uint k) { return ivec3(k & 1u, (k >> 1) & 1u, k >> 2); }
 // The k-th of eight blocks that its bricks can be in.
-ivec3 block_of(Reach r, uint k) { return field_brick(r.first) + ivec3(k & 1u, (k >> 1) & 1u, k >> 2); }
+ivec3 block_of(Reach r, uint k) { return field_brick(r.first) + ahead_of(k); }
+
+// A bit for each of eight blocks that are not further ahead than a last one; and the next of those that are left.
+uint blocks_up_to(ivec3 ahead) {
+    uint blocks = 1u;
+    if (ahead.x > 0) blocks |= blocks << 1;
+    if (ahead.y > 0) blocks |= blocks << 2;
+    if (ahead.z > 0) blocks |= blocks << 4;
+    return blocks;
+}
+uint next_block(inout uint left) {
+    uint k = uint(findLSB(left));
+    left &= left - 1u;
+    return k;
+}
 #endif
 
 uvec4 directory_texel(uint i) { return uvec4(table.at[4u * i], table.at[4u * i + 1u], table.at[4u * i + 2u], table.at[4u * i + 3u]); }
@@ -90,7 +106,7 @@ void main() {
     if (i >= build.count || points.at[i].w == 0.0) return;
     Reach r = reach_of(points.at[i]);
     vec3 part;
-    ivec3 base = block_of_node(origin_node(part)), blocks = field_brick(r.last) - field_brick(r.first);
+    ivec3 base = block_of_node(origin_node(part));
     // The bricks that it reaches: for each of three planes of them a bit a brick, four bits a row, sixteen a block; and the same in the
     // blocks ahead on x.
     const uint row_bits = uint((1 << FIELD_BRICK) - 1);
@@ -103,14 +119,9 @@ void main() {
         planes[k / 3] |= (row & row_bits) << place;
         planes_ahead[k / 3] |= row >> FIELD_BRICK << place;
     }
-    // Of its eight blocks those that are there to be reached.
-    uint left = 1u;
-    if (blocks.x > 0) left |= left << 1;
-    if (blocks.y > 0) left |= left << 2;
-    if (blocks.z > 0) left |= left << 4;
+    uint left = blocks_up_to(field_brick(r.last) - field_brick(r.first));
     while (left != 0u) {
-        uint b = uint(findLSB(left));
-        left &= left - 1u;
+        uint b = next_block(left);
         uvec3 halves = ((b & 1u) == 0u ? planes : planes_ahead) >> (8u * (b & 2u)) & 0xffffu;
         uvec2 bits = uvec2(0u);
         for (int k = 0; k < 3; ++k) {
@@ -235,18 +246,19 @@ void main() {
     // Nodes from the first that it can reach on, in spacings from the point, and among those of its bricks.
     ivec3 low = ivec3(floor(r.part - build.reach)) + 1, first = field_brick(r.node + low), at = r.node + low - (first << FIELD_BRICK_BITS);
     vec3 offset = vec3(low) - r.part;
-    // The numbers of these, x before y before z. Mostly they are one block's.
+    // The numbers of these, x before y before z, block by block: mostly they are one block's.
     uint numbers[BRICKS * BRICKS * BRICKS];
-    ivec3 block = field_brick(first);
-    uvec4 words;
-    field_slot(block, base, build.slots, words);
-    for (int k = 0; k < BRICKS * BRICKS * BRICKS; ++k) {
-        ivec3 brick = first + ivec3(k % BRICKS, k / BRICKS % BRICKS, k / (BRICKS * BRICKS));
-        if (field_brick(brick) != block) {
-            block = field_brick(brick);
-            field_slot(block, base, build.slots, words);
+    for (int k = 0; k < BRICKS * BRICKS * BRICKS; ++k) numbers[k] = 0u;
+    ivec3 first_block = field_brick(first), last = field_brick(r.node + ivec3(floor(r.part + build.reach)));
+    uint left = blocks_up_to(field_brick(last) - first_block);
+    while (left != 0u) {
+        ivec3 block = first_block + ahead_of(next_block(left));
+        uvec4 words;
+        field_slot(block, base, build.slots, words);
+        for (int k = 0; k < BRICKS * BRICKS * BRICKS; ++k) {
+            ivec3 brick = first + ivec3(k % BRICKS, k / BRICKS % BRICKS, k / (BRICKS * BRICKS));
+            if (field_brick(brick) == block) numbers[k] = field_number(words, field_local(brick));
         }
-        numbers[k] = field_number(words, field_local(brick));
     }
     // Two nodes that share a word at a time, from the word of the first on; how near those of a word are to the point on x.
     int word = at.x >> 1;
@@ -260,7 +272,7 @@ void main() {
         for (int k = 0; k < BRICKS * BRICKS * BRICKS; ++k) {
             if (k / (BRICKS * BRICKS) == (at.z + z) >> FIELD_BRICK_BITS) plane[k % (BRICKS * BRICKS)] = numbers[k];
         }
-        // The words that it reaches, a bit each; FIELD_ROW_WORDS for a row.
+        // The words that it reaches, a bit each, four for a row.
         float dz = offset.z + float(z);
         uint reached = 0u;
         for (int y = 0; y < ACROSS; ++y) {
