@@ -10,7 +10,7 @@ use crate::{
     parameters::parameters,
     passes::{Points, per_particle},
     plan::{Call, Groups, Plan, Target},
-    prepare::density::lattice,
+    prepare::lattice,
     scene::Scene,
     shader::{
         FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_LIST_COMP, FIELD_MARK_COMP,

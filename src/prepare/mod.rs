@@ -25,6 +25,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, Mat3, Vec3};
 
+pub(crate) use density::lattice;
 pub use density::{DensityField, classes_over, classify, densities};
 pub use device::{DeviceCount, DeviceIds, DevicePositions};
 pub(crate) use device::{Kept, Words};
