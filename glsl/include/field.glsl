@@ -19,6 +19,12 @@ uint field_local(ivec3 node) {
 }
 ivec3 field_from_local(uint k) { return ivec3(k, k >> FIELD_BRICK_BITS, k >> (2 * FIELD_BRICK_BITS)) & (FIELD_BRICK - 1); }
 
+// The lowest of some bits, which it is taken out of.
+uint field_next(inout uint bits) {
+    uint k = uint(findLSB(bits));
+    bits &= bits - 1u;
+    return k;
+}
 bool field_bit(uvec2 bits, uint k) { return ((k < 32u ? bits.x : bits.y) >> (k & 31u) & 1u) != 0u; }
 // How many bits there are before one.
 uint field_before(uvec2 bits, uint k) {

@@ -33,5 +33,5 @@ vec3 distances(Reach r, int axis) {
 // What a particle in the field adds where its kernel is 1, in whole numbers of a node.
 float unit_of(vec4 point) {
     float rim = max(FIELD_RIM - FIELD_THINNED * (FIELD_RIM - point.w), FIELD_THIN);
-    return build.unit / max(min(min(point.w, rim), FIELD_DENSEST), FIELD_CROWD * point.w);
+    return min(build.unit / max(min(min(point.w, rim), FIELD_DENSEST), FIELD_CROWD * point.w), FIELD_MOST_SHARE);
 }

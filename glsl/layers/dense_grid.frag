@@ -12,5 +12,5 @@ void main() {
     vec2 across = vec2(ivec2(gl_FragCoord.xy) - node.xy) - part.xy;
     vec4 along = vec4(0.0, 1.0, 2.0, 3.0) - float(node.z) - part.z;
     vec4 within = max(1.0 - (dot(across, across) + along * along) / (build.reach * build.reach), 0.0);
-    out_shares = min(unit, FIELD_MOST_SHARE) * within * within;
+    out_shares = unit * within * within;
 }

@@ -49,18 +49,13 @@ ivec3 ahead_of(uint k) { return ivec3(k & 1u, (k >> 1) & 1u, k >> 2); }
 // The k-th of eight blocks that its bricks can be in.
 ivec3 block_of(Reach r, uint k) { return field_brick(r.first) + ahead_of(k); }
 
-// A bit for each of eight blocks that are not further ahead than a last one; and the next of those that are left.
+// A bit for each of eight blocks that are not further ahead than a last one.
 uint blocks_up_to(ivec3 ahead) {
     uint blocks = 1u;
     if (ahead.x > 0) blocks |= blocks << 1;
     if (ahead.y > 0) blocks |= blocks << 2;
     if (ahead.z > 0) blocks |= blocks << 4;
     return blocks;
-}
-uint next_block(inout uint left) {
-    uint k = uint(findLSB(left));
-    left &= left - 1u;
-    return k;
 }
 #endif
 
@@ -121,7 +116,7 @@ void main() {
     }
     uint left = blocks_up_to(field_brick(r.last) - field_brick(r.first));
     while (left != 0u) {
-        uint b = next_block(left);
+        uint b = field_next(left);
         uvec3 halves = ((b & 1u) == 0u ? planes : planes_ahead) >> (8u * (b & 2u)) & 0xffffu;
         uvec2 bits = uvec2(0u);
         for (int k = 0; k < 3; ++k) {
@@ -190,7 +185,7 @@ bool strays(bool asked, vec4 point, Reach r, ivec3 base) {
     float f = 0.0;
     vec3 gradient = vec3(0.0);
     for (uint c = 0u; asked && c < 8u; ++c) {
-        ivec3 step = ivec3(c & 1u, (c >> 1) & 1u, c >> 2), node = r.node + step;
+        ivec3 step = ahead_of(c), node = r.node + step;
         vec3 weights = mix(1.0 - r.part, r.part, bvec3(step));
         uvec4 words;
         field_slot(field_brick(field_brick(node)), base, build.slots, words);
@@ -213,7 +208,7 @@ void main() {
     ball = ball || strays(asked, point, r, base);
     vec3 x = distances(r, 0), y = distances(r, 1), z = distances(r, 2);
     for (uint k = 0u; ball && k < 8u; ++k) {
-        ivec3 step = ivec3(k & 1u, (k >> 1) & 1u, k >> 2), brick = r.first + step;
+        ivec3 step = ahead_of(k), brick = r.first + step;
         bool reached = x[step.x] + y[step.y] + z[step.z] < r.reach * r.reach;
         uvec4 words;
         uint slot = field_slot(field_brick(brick), base, build.slots, words), local = field_local(brick), number = field_number(words, local);
@@ -242,7 +237,7 @@ void main() {
     vec4 point = points.at[i];
     Reach r = reach_of(point);
     ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
-    float unit = min(unit_of(point), FIELD_MOST_SHARE), per_square = 1.0 / (build.reach * build.reach);
+    float unit = unit_of(point), per_square = 1.0 / (build.reach * build.reach);
     // Nodes from the first that it can reach on, in spacings from the point, and among those of its bricks.
     ivec3 low = ivec3(floor(r.part - build.reach)) + 1, first = field_brick(r.node + low), at = r.node + low - (first << FIELD_BRICK_BITS);
     vec3 offset = vec3(low) - r.part;
@@ -252,7 +247,7 @@ void main() {
     ivec3 first_block = field_brick(first), last = field_brick(r.node + ivec3(floor(r.part + build.reach)));
     uint left = blocks_up_to(field_brick(last) - first_block);
     while (left != 0u) {
-        ivec3 block = first_block + ahead_of(next_block(left));
+        ivec3 block = first_block + ahead_of(field_next(left));
         uvec4 words;
         field_slot(block, base, build.slots, words);
         for (int k = 0; k < BRICKS * BRICKS * BRICKS; ++k) {
@@ -280,8 +275,7 @@ void main() {
             for (int pair = 0; pair <= ACROSS / 2; ++pair) reached |= uint(nearest[pair] > across) << (4 * y + pair);
         }
         while (reached != 0u) {
-            int k = findLSB(reached), y = k >> 2, pair = k & 3;
-            reached &= reached - 1u;
+            int k = int(field_next(reached)), y = k >> 2, pair = k & 3;
             vec2 x = from + float(2 * pair) + vec2(0.0, 1.0);
             float dy = offset.y + float(y);
             vec2 within = max(1.0 - (x * x + (dy * dy + dz * dz)) * per_square, 0.0);
@@ -441,9 +435,6 @@ void main() {
     barrier();
     if (!mixed || first_cell[own] == build.cell_capacity) return;
     uint cell = first_cell[own] + field_before(bits, 8u * lane);
-    while (holding != 0u) {
-        write_cell(cell++, 8u * lane + uint(findLSB(holding)));
-        holding &= holding - 1u;
-    }
+    while (holding != 0u) write_cell(cell++, 8u * lane + field_next(holding));
 }
 #endif

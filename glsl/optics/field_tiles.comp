@@ -68,9 +68,8 @@ void main() {
     while (surface != 0u || (entry != 0u && left > 0u)) {
         vec3 low, high;
         if (surface != 0u) {
-            low = brick + vec3(field_from_local(8u * k + uint(findLSB(surface))));
+            low = brick + vec3(field_from_local(8u * k + field_next(surface)));
             high = low + 1.0;
-            surface &= surface - 1u;
         } else {
             uvec2 ball = balls.at[entry - 1u];
             vec3 center = brick + field_ball(ball.x);

@@ -52,7 +52,8 @@ fn compare(shot: &Shot, points: &[Vec4], grid: &DenseGrid, radius: f32, label: &
 #[test]
 fn nodes_bricks_and_flags_are_the_fields_twins() {
     let wide = nodes(DenseGrid::default(), [60, 96, 64]);
-    let tight = nodes(DenseGrid::default().spacing(1.5).kernel_radius(4.75).level(0.4), [12, 16, 12]);
+    // Just so far that no particle of a lattice reaches exactly up to a brick, where rounding says whether the grid has it.
+    let tight = nodes(DenseGrid::default().spacing(1.5).kernel_radius(4.99).level(0.4), [12, 16, 12]);
     let (all, part) = (Cell::new(0), Cell::new(0));
     for (name, radius, positions) in clouds() {
         for grid in [wide, tight] {

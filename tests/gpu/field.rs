@@ -217,7 +217,11 @@ pub fn check(shot: &Shot, [points, added]: [&[Vec4]; 2], lattice: &Lattice, roun
 #[test]
 fn nodes_bricks_and_flags_are_the_twins() {
     for (name, radius, positions) in clouds() {
-        for field in [Field::default(), Field::default().spacing(1.5).kernel_radius(4.0).level(0.4)] {
+        for field in [
+            Field::default(),
+            Field::default().spacing(1.5).kernel_radius(4.0).level(0.4),
+            Field::default().spacing(1.5).kernel_radius(5.0).level(0.4),
+        ] {
             let lattice = Lattice::new(&field, radius);
             let case = Case { settings: settings(field, "one"), ..empty(radius) };
             each_driver(|driver| {
