@@ -129,35 +129,41 @@ bool ball_around(vec3 x, uint entry, out vec3 center) {
     return least != none;
 }
 
-// The first root in a cell, as a part of the ray's way through it, at which h, `side` times the field less its level, falls through
-// zero; from a place where it is not above zero, after it has been. Along the way the field is a cubic, known by four values.
-bool falls(vec4 h, inout bool own, out float root) {
-    float c0 = h.x, c1 = 0.5 * (-11.0 * h.x + 18.0 * h.y - 9.0 * h.z + 2.0 * h.w),
-          c2 = 4.5 * (2.0 * h.x - 5.0 * h.y + 4.0 * h.z - h.w), c3 = 4.5 * (-h.x + 3.0 * h.y - 3.0 * h.z + h.w);
+// A cubic, by its coefficients.
+float cubic_at(vec4 c, float t) { return c.x + t * (c.y + t * (c.z + t * c.w)); }
+
+// Whether h, `side` times the field less its level along a ray's way through a cell, falls through zero there: from a place where it is not
+// above zero, after it has been. It is a cubic, known by four values; and the bracket of the first such place, as parts of the way.
+bool falls(vec4 h, inout bool own, out vec4 c, out vec2 bracket) {
+    c = vec4(h.x, 0.5 * (-11.0 * h.x + 18.0 * h.y - 9.0 * h.z + 2.0 * h.w), 4.5 * (2.0 * h.x - 5.0 * h.y + 4.0 * h.z - h.w),
+             4.5 * (-h.x + 3.0 * h.y - 3.0 * h.z + h.w));
     // Between its extrema a cubic is monotone.
-    float b = c2, disc = b * b - 3.0 * c3 * c1, q = -(b + (b < 0.0 ? -1.0 : 1.0) * sqrt(max(disc, 0.0)));
-    vec2 extrema = vec2(abs(c3) > 1e-20 ? q / (3.0 * c3) : 1.0, abs(q) > 1e-20 ? c1 / q : 1.0);
+    float b = c.z, disc = b * b - 3.0 * c.w * c.y, q = -(b + (b < 0.0 ? -1.0 : 1.0) * sqrt(max(disc, 0.0)));
+    vec2 extrema = vec2(abs(c.w) > 1e-20 ? q / (3.0 * c.w) : 1.0, abs(q) > 1e-20 ? c.y / q : 1.0);
     extrema = clamp(disc > 0.0 ? extrema : vec2(1.0), 0.0, 1.0);
     float ends[3] = float[](min(extrema.x, extrema.y), max(extrema.x, extrema.y), 1.0);
-    float from = 0.0, to = 0.0;
+    bracket = vec2(0.0);
     own = own || h.x > 0.0;
     bool found = own && h.x < 0.0;
     for (int i = 0; i < 3 && !found; ++i) {
-        from = to;
-        to = ends[i];
-        float value = i == 2 ? h.w : c0 + to * (c1 + to * (c2 + to * c3));
+        bracket = vec2(bracket.y, ends[i]);
+        float value = i == 2 ? h.w : cubic_at(c, ends[i]);
         found = own && value < 0.0;
         own = own || value > 0.0;
     }
-    for (int i = 0; i < FIELD_HALVINGS && found; ++i) {
-        float middle = 0.5 * (from + to);
-        if (c0 + middle * (c1 + middle * (c2 + middle * c3)) < 0.0) to = middle;
-        else from = middle;
+    return found;
+}
+
+// Where a cubic falls through zero in its bracket.
+float root_of(vec4 c, vec2 bracket) {
+    for (int i = 0; i < FIELD_HALVINGS; ++i) {
+        float middle = 0.5 * (bracket.x + bracket.y);
+        if (cubic_at(c, middle) < 0.0) bracket.y = middle;
+        else bracket.x = middle;
     }
     // So near it is as good as straight.
-    float before = c0 + from * (c1 + from * (c2 + from * c3)), behind = c0 + to * (c1 + to * (c2 + to * c3));
-    root = mix(from, to, clamp(before / max(before - behind, 1e-20), 0.0, 1.0));
-    return found;
+    float before = cubic_at(c, bracket.x), behind = cubic_at(c, bracket.y);
+    return mix(bracket.x, bracket.y, clamp(before / max(before - behind, 1e-20), 0.0, 1.0));
 }
 
 // The nearest ball of a brick that a ray from outside meets before `wall`.
@@ -222,56 +228,61 @@ bool cross_cubes(inout Course c, bool go, vec3 low, float span, uvec2 stops, out
 // The first wall that a ray meets from x on, from t to `reach`: of the field from within it, or from outside of all liquid of whichever
 // comes first. Without one its t is NONE, and `stopped` says whether steps ran out.
 Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float reach, out bool stopped) {
-    Wall wall = Wall(NONE, CLASS_BODY, vec3(0.0), 0u, 0u);
+    Wall wall = Wall(NONE, CLASS_BODY, vec3(0.0), 0u, 0u), found = wall;
     float side = inside ? 1.0 : -1.0;
     vec3 per_dir = 1.0 / mix(dir, vec3(1e-20), lessThan(abs(dir), vec3(1e-20)));
     Course c = Course(x, dir, per_dir, vec3(greaterThan(per_dir, vec3(0.0))), t, floor(x + t * dir));
     bool own = false, first = true, met = false;
+    // The cell in which it meets the field's: from when to when the ray is in it, the cubic there, and its bracket.
+    vec2 times = vec2(0.0), bracket = vec2(0.0);
+    vec4 cubic = vec4(0.0);
     uint steps = 0u;
     while (!met && c.t < min(reach, wall.t) && steps < FIELD_STEPS) {
-        // On to a cell that holds the surface, from outside also to a brick into which balls reach: block by block, in those with bricks to stop
-        // in brick by brick, in those cell by cell. Balls come after the loop, for CPUs look at a first one whether there is one or not.
-        bool at_surface = false;
-        uint cell = 0u, ball = 0u;
-        vec3 brick = vec3(0.0);
-        while (!at_surface && (inside || ball == 0u) && c.t < min(reach, wall.t) && steps < FIELD_STEPS) {
-            ++steps;
-            look_up(block, c.cell);
-            uvec2 stops = inside ? block.surfaces : block.surfaces | block.balls;
-            uint k;
-            bool stop = cross_cubes(c, true, block.low, BLOCK_EDGE, stops, k, first);
-            uvec4 words = stop ? brick_words(block.first + field_before(block.there, k)) : uvec4(0u);
-            bool surface = stop && field_bit(block.surfaces, k);
-            ball = words[FIELD_FIRST_BALL];
-            brick = BRICK_EDGE * floor(c.cell / BRICK_EDGE);
-            uvec2 bits = surface ? words.xy : uvec2(0u);
-            at_surface = cross_cubes(c, stop, brick, BRICK_EDGE, bits, k, first);
-            if (at_surface) cell = words[FIELD_FIRST_CELL] + field_before(bits, k);
-        }
-        if (!inside) meet_balls(ball, brick, x, dir, wall);
-        if (at_surface) {
-            uvec4 corners = cell_words(cell, 0u);
-            vec4 low = held(corners.x), high = held(corners.y);
-            vec3 place = c.cell, border = (place + c.ahead - x) * per_dir;
-            float begin = c.t, out_of = min(border.x, min(border.y, border.z)), end = max(out_of, begin);
-            vec3 from = x + begin * dir - place, along = (end - begin) * dir;
-            vec4 h = side * vec4(trilinear(low, high, from), trilinear(low, high, from + along / 3.0),
-                                 trilinear(low, high, from + along * (2.0 / 3.0)), trilinear(low, high, from + along));
-            own = own || !first;
-            float root;
-            met = falls(h, own, root);
-            // A ray that does not come to its side in the cell in which it starts is through at once.
-            if (!met && !own) {
-                met = true;
-                root = 0.0;
+        // On to a brick that holds the surface, from outside also to one into which balls reach; or to the next block.
+        ++steps;
+        look_up(block, c.cell);
+        uint k;
+        bool stop = cross_cubes(c, true, block.low, BLOCK_EDGE, inside ? block.surfaces : block.surfaces | block.balls, k, first);
+        uvec4 words = stop ? brick_words(block.first + field_before(block.there, k)) : uvec4(0u);
+        uvec2 surface = stop && field_bit(block.surfaces, k) ? words.xy : uvec2(0u);
+        vec3 brick = BRICK_EDGE * floor(c.cell / BRICK_EDGE);
+        if (!inside) meet_balls(words[FIELD_FIRST_BALL], brick, x, dir, wall);
+        // In it from cell to cell of those that hold the surface: CPUs do without looking up block and brick each time.
+        bool in_brick = true;
+        while (in_brick) {
+            in_brick = cross_cubes(c, stop, brick, BRICK_EDGE, surface, k, first) && c.t < min(reach, wall.t);
+            if (in_brick) {
+                uint cell = words[FIELD_FIRST_CELL] + field_before(surface, k);
+                uvec4 corners = cell_words(cell, 0u);
+                vec4 low = held(corners.x), high = held(corners.y);
+                vec3 place = c.cell, border = (place + c.ahead - x) * per_dir;
+                float begin = c.t, out_of = min(border.x, min(border.y, border.z)), end = max(out_of, begin);
+                vec3 from = x + begin * dir - place, along = (end - begin) * dir;
+                vec4 h = side * vec4(trilinear(low, high, from), trilinear(low, high, from + along / 3.0),
+                                     trilinear(low, high, from + along * (2.0 / 3.0)), trilinear(low, high, from + along));
+                own = own || !first;
+                met = falls(h, own, cubic, bracket);
+                // A ray that does not come to its side in the cell in which it starts is through at once.
+                if (!met && !own) {
+                    met = true;
+                    bracket = vec2(0.0);
+                }
+                if (met) {
+                    times = vec2(begin, end);
+                    found = Wall(NONE, CLASS_BODY, place, cell, words[FIELD_FIRST_BALL]);
+                }
+                first = false;
+                c.t = end;
+                c.cell = mix(place, place + 2.0 * c.ahead - 1.0, equal(border, vec3(out_of)));
+                in_brick = !met && BRICK_EDGE * floor(c.cell / BRICK_EDGE) == brick;
             }
-            first = false;
-            c.t = met ? mix(begin, end, root) : end;
-            c.cell = mix(place, place + 2.0 * c.ahead - 1.0, equal(border, vec3(out_of)));
-            if (met && c.t < min(reach, wall.t)) wall = Wall(c.t, CLASS_BODY, place, cell, ball);
         }
     }
     stopped = !met && c.t < min(reach, wall.t);
+    if (met) {
+        found.t = mix(times.x, times.y, root_of(cubic, bracket));
+        if (found.t < min(reach, wall.t)) wall = found;
+    }
     return wall;
 }
 
