@@ -30,7 +30,7 @@ pub struct Point {
     pub position: Vec3,
     /// Its number density, as a part of a filled body's.
     pub density: f32,
-    /// A splash of less than 0.4 of a filled body's density is a ball beside the field ([`Point::is_ball`]).
+    /// A splash of less than 0.35 of a filled body's density is a ball beside the field ([`Point::is_ball`]).
     pub class: Class,
 }
 

@@ -282,17 +282,20 @@ struct Prepare {
 // around particles on one spot under the narrowest kernel; a node has room for 8).
 #define FIELD_CROWD 0.4
 // Splashes from this number density on, as a part of a filled body's, belong to the field as the body does: pairs and rows in reach of each other.
-#define FIELD_JOINS 0.4
+#define FIELD_JOINS 0.35
 // Below the number density FIELD_RIM particles lie at the edge of a sheet. They count as less dense than they are, down to FIELD_THIN: the
 // surface would draw back there.
 #define FIELD_RIM 0.65
 #define FIELD_THIN 0.42
-#define FIELD_THINNED 3.8
+#define FIELD_THINNED 3.3
 // From the number density FIELD_SURE on the field encloses a particle. Below FIELD_TIP, at corners and ends of threads, it has to go on
 // beyond the particle for FIELD_BEYOND radii.
 #define FIELD_SURE 0.8
 #define FIELD_TIP 0.52
 #define FIELD_BEYOND 0.6
+// Who is not enclosed by FIELD_ENOUGH of the level more adds FIELD_RAISED of what that lacks: its neighbours along an edge lack as much.
+#define FIELD_ENOUGH 0.02
+#define FIELD_RAISED 0.45
 // The most that one particle adds to a node: below it whatever density the host says.
 #define FIELD_MOST_SHARE 32767.0
 // What the box of a dense grid's bricks is without any.
@@ -379,6 +382,14 @@ struct FieldHead {
     float part_x;  // how far beyond that block's first node the origin lies, in spacings
     float part_y;
     float part_z;
+};
+
+// Strays: points that are balls, and those that the field may not enclose.
+struct FieldStrays {
+    uint groups_x; // one invocation for each
+    uint groups_y;
+    uint groups_z;
+    uint count;
 };
 
 // How a look-up is moved: by the normal times T; to where the bent ray's direction vanishes, with an index that grows with T;

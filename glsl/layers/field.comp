@@ -1,9 +1,10 @@
 // The density field as bricks of nodes, where there is any (docs/methods.md, "Density field"). MARK enters the bricks that points reach
-// in the directory, block by block, NUMBER numbers them, SCATTER adds each point's share to the nodes that it reaches, as whole numbers, whose
-// sum does not hang on the order; LIST lists the balls in each brick: splashes that are alone, and particles in the field that it does not
-// enclose; FINISH finds the cells that hold the surface, and puts together what a walk looks at in them.
+// in the directory, block by block, and notes strays: points that are balls, and those that the field may not enclose. NUMBER numbers bricks,
+// SCATTER adds each point's share to the nodes that it reaches, as whole numbers, whose sum does not hang on the order; LACK finds what strays
+// lack to be enclosed, RAISE adds it, LIST lists the balls in each brick: strays that are none of the field's, or still not enclosed.
+// FINISH finds the cells that hold the surface, and puts together what a walk looks at in them.
 #version 460
-// Compiled with one of: MARK, NUMBER, SCATTER, LIST, FINISH
+// Compiled with one of: MARK, NUMBER, SCATTER, LACK, RAISE, LIST, FINISH
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "groups.glsl"
@@ -12,12 +13,15 @@
 #include "field.glsl"
 layout(local_size_x = PARTICLE_GROUP) in;
 layout(push_constant) uniform PushBlock { FieldBuild build; };
-#if defined(SCATTER) || defined(FINISH)
+#if defined(LACK) || defined(RAISE)
+#define STRAYS
+#endif
+#if defined(SCATTER) || defined(STRAYS) || defined(FINISH)
 layout(set = 0, binding = 1, std430) readonly buffer HeadBlock { FieldHead head; };
 #elif !defined(MARK)
 layout(set = 0, binding = 1, std430) buffer HeadBlock { FieldHead head; };
 #endif
-#ifdef SCATTER
+#if defined(SCATTER) || defined(STRAYS)
 layout(set = 0, binding = 2, std430) readonly buffer TableBlock { uint at[]; } table;
 #else
 layout(set = 0, binding = 2, std430) buffer TableBlock { uint at[]; } table;
@@ -29,11 +33,16 @@ const uint BRICKS = 0u, CELLS = 1u, BRICKS_LEFT_OUT = 2u, CELLS_LEFT_OUT = 3u, B
 // Positions; w: their number density as a part of a filled body's, negative for balls, 0 where there is nothing.
 layout(set = 0, binding = 3, std430) readonly buffer PointBlock { vec4 at[]; } points;
 #endif
-#if !defined(MARK) && !defined(SCATTER)
+#if defined(NUMBER) || defined(LIST) || defined(FINISH)
 layout(set = 0, binding = 6, std430) buffer RecordBlock { uint at[]; } records;
 #endif
-#if defined(SCATTER) || defined(LIST) || defined(FINISH)
+#if !defined(MARK) && !defined(NUMBER)
 layout(set = 0, binding = 7, std430) buffer NodeBlock { uint at[]; } nodes;
+#endif
+#if defined(MARK) || defined(STRAYS) || defined(LIST)
+layout(set = 0, binding = 9, std430) buffer StraysBlock { FieldStrays strays; };
+// Of each stray the number of its point, and what that adds besides where its kernel is 1, as a float; where there will be cells.
+layout(set = 0, binding = 10, std430) buffer StrayBlock { uvec2 at[]; } stray;
 #endif
 
 #if defined(MARK) || defined(NUMBER)
@@ -99,6 +108,15 @@ void enter(ivec3 block, ivec3 base, uvec2 bits, uint name) {
 void main() {
     uint i = invocation();
     if (i >= build.count || points.at[i].w == 0.0) return;
+    if (points.at[i].w < FIELD_SURE) {
+        uint entry = atomicAdd(strays.count, 1u), group = entry / PARTICLE_GROUP;
+        stray.at[entry] = uvec2(i, 0u);
+        if (entry % PARTICLE_GROUP == 0u) {
+            atomicMax(strays.groups_x, min(group + 1u, MOST_GROUPS));
+            atomicMax(strays.groups_y, group / MOST_GROUPS + 1u);
+            strays.groups_z = 1u;
+        }
+    }
     Reach r = reach_of(points.at[i]);
     vec3 part;
     ivec3 base = block_of_node(origin_node(part));
@@ -176,38 +194,64 @@ void main() {
 }
 #endif
 
+#if defined(LACK) || defined(LIST)
+// What a particle lacks where it is, so that the field encloses it, in whole numbers of a node; none or less where it is enclosed by
+// more than enough. `own`: what it adds there itself, as a part of what it adds where its kernel is 1.
+float lacks(vec4 point, ivec3 base, out float own) {
+    Reach r = reach_of(point);
+    // The field between nodes, and its gradient: in mostly one block.
+    float f = 0.0;
+    vec3 gradient = vec3(0.0);
+    own = 0.0;
+    ivec3 first = field_brick(field_brick(r.node));
+    uint left = blocks_up_to(field_brick(field_brick(r.node + 1)) - first);
+    while (left != 0u) {
+        ivec3 block = first + ahead_of(field_next(left));
+        uvec4 words;
+        field_slot(block, base, build.slots, words);
+        for (uint c = 0u; c < 8u; ++c) {
+            ivec3 step = ahead_of(c), node = r.node + step;
+            vec3 weights = mix(1.0 - r.part, r.part, bvec3(step)), away = vec3(step) - r.part;
+            bool here = field_brick(field_brick(node)) == block;
+            uint number = here ? field_number(words, field_local(field_brick(node))) : 0u;
+            uint pair = nodes.at[FIELD_NODE_WORDS * number + field_local(node) / 2u];
+            float sum = here ? float(int(pair >> (16 * (node.x & 1)) & 0xffffu)) : 0.0, weight = here ? weights.x * weights.y * weights.z : 0.0;
+            float within = max(1.0 - dot(away, away) / (build.reach * build.reach), 0.0);
+            f += weight * sum;
+            own += weight * within * within;
+            gradient += mix(vec3(-sum), vec3(sum), bvec3(step)) * weights.yzx * weights.zxy;
+        }
+    }
+    if (point.w < FIELD_TIP) f -= FIELD_BEYOND / SPLASH_RADIUS * build.ball * length(gradient);
+    return float(build.level) - f;
+}
+#endif
+
+#ifdef LACK
+void main() {
+    uint i = invocation();
+    if (i >= strays.count) return;
+    vec4 point = points.at[stray.at[i].x];
+    if (point.w < 0.0) return;
+    float own, lacking = lacks(point, ivec3(head.base_x, head.base_y, head.base_z), own) + FIELD_ENOUGH * float(build.level);
+    if (lacking > 0.0) stray.at[i].y = floatBitsToUint(min(FIELD_RAISED * lacking / own, unit_of(point)));
+}
+#endif
+
 #ifdef LIST
 layout(set = 0, binding = 8, std430) writeonly buffer BallBlock { uvec2 at[]; } balls;
 
-// Whether the field does not enclose one of its particles.
-bool strays(bool asked, vec4 point, Reach r, ivec3 base) {
-    // The field where it is, between nodes, and its gradient.
-    float f = 0.0;
-    vec3 gradient = vec3(0.0);
-    for (uint c = 0u; asked && c < 8u; ++c) {
-        ivec3 step = ahead_of(c), node = r.node + step;
-        vec3 weights = mix(1.0 - r.part, r.part, bvec3(step));
-        uvec4 words;
-        field_slot(field_brick(field_brick(node)), base, build.slots, words);
-        uint number = field_number(words, field_local(field_brick(node)));
-        uint pair = nodes.at[FIELD_NODE_WORDS * number + field_local(node) / 2u];
-        float sum = float(int(pair >> (16 * (node.x & 1)) & 0xffffu));
-        f += weights.x * weights.y * weights.z * sum;
-        gradient += mix(vec3(-sum), vec3(sum), bvec3(step)) * weights.yzx * weights.zxy;
-    }
-    if (point.w < FIELD_TIP) f -= FIELD_BEYOND / SPLASH_RADIUS * build.ball * length(gradient);
-    return asked && f < float(build.level);
-}
-
 void main() {
     uint i = invocation();
-    vec4 point = points.at[min(i, build.count - 1u)];
-    bool there = i < build.count, ball = there && point.w < 0.0, asked = there && point.w > 0.0 && point.w < FIELD_SURE;
+    if (i >= strays.count) return;
+    uvec2 entry = stray.at[i];
+    vec4 point = points.at[entry.x];
     ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
+    float own;
+    if (point.w > 0.0 && (entry.y == 0u || lacks(point, base, own) <= 0.0)) return;
     Reach r = reach_of(vec4(point.xyz, -1.0));
-    ball = ball || strays(asked, point, r, base);
     vec3 x = distances(r, 0), y = distances(r, 1), z = distances(r, 2);
-    for (uint k = 0u; ball && k < 8u; ++k) {
+    for (uint k = 0u; k < 8u; ++k) {
         ivec3 step = ahead_of(k), brick = r.first + step;
         bool reached = x[step.x] + y[step.y] + z[step.z] < r.reach * r.reach;
         uvec4 words;
@@ -226,18 +270,25 @@ void main() {
 }
 #endif
 
-#ifdef SCATTER
+#if defined(SCATTER) || defined(RAISE)
 layout(constant_id = 1) const int ACROSS = 6; // nodes that a kernel can reach on an axis
 
 const int BRICKS = (ACROSS + 2) / FIELD_BRICK + 1; // in which these can be
 
 void main() {
     uint i = invocation();
+#ifdef RAISE
+    if (i >= strays.count || stray.at[i].y == 0u) return;
+    vec4 point = points.at[stray.at[i].x];
+    float unit = uintBitsToFloat(stray.at[i].y);
+#else
     if (i >= build.count || points.at[i].w <= 0.0) return;
     vec4 point = points.at[i];
+    float unit = unit_of(point);
+#endif
     Reach r = reach_of(point);
     ivec3 base = ivec3(head.base_x, head.base_y, head.base_z);
-    float unit = unit_of(point), per_square = 1.0 / (build.reach * build.reach);
+    float per_square = 1.0 / (build.reach * build.reach);
     // Nodes from the first that it can reach on, in spacings from the point, and among those of its bricks.
     ivec3 low = ivec3(floor(r.part - build.reach)) + 1, first = field_brick(r.node + low), at = r.node + low - (first << FIELD_BRICK_BITS);
     vec3 offset = vec3(low) - r.part;

@@ -24,7 +24,7 @@ use ash::vk;
 
 parameters! {
     /// The level of the same density field on a dense grid, to whose slices sprites of the particles add, four at once
-    /// (Iwasaki06); splashes of less than 0.4 of a filled body's number density are balls beside it. What of the liquid lies beyond
+    /// (Iwasaki06); splashes of less than 0.35 of a filled body's number density are balls beside it. What of the liquid lies beyond
     /// the grid is left out, and counted.
     pub struct DenseGrid {
         /// Distance of the grid's nodes, as of `field`

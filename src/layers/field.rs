@@ -13,9 +13,9 @@ use crate::{
     prepare::lattice,
     scene::Scene,
     shader::{
-        FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_LIST_COMP, FIELD_MARK_COMP,
-        FIELD_MOST_BRICKS, FIELD_NODE_WORDS, FIELD_NODES, FIELD_NUMBER_COMP, FIELD_ONE, FIELD_RECORD,
-        FIELD_SCATTER_COMP, FIELD_SLOT, FieldBuild, FieldHead, SPLASH_RADIUS, Shader,
+        FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_LACK_COMP, FIELD_LIST_COMP, FIELD_MARK_COMP,
+        FIELD_MOST_BRICKS, FIELD_NODE_WORDS, FIELD_NODES, FIELD_NUMBER_COMP, FIELD_ONE, FIELD_RAISE_COMP, FIELD_RECORD,
+        FIELD_SCATTER_COMP, FIELD_SLOT, FieldBuild, FieldHead, FieldStrays, SPLASH_RADIUS, Shader,
     },
     space::power_of_two,
 };
@@ -23,8 +23,8 @@ use ash::vk;
 
 parameters! {
     /// The level of a density field on a sparse grid (Iwasaki06), each particle's share divided by its number density; splashes
-    /// of less than 0.4 of a filled body's are balls beside it, and so is what the surface does not enclose: at the ends of sheets and
-    /// threads, at the corners of a block. What is counted is read with the feature `inspect` (`Renderer::counters`).
+    /// of less than 0.35 of a filled body's are balls beside it, and so is what the surface does not enclose, though it adds to
+    /// the field there: at the ends of sheets and threads, at the corners of a block. What is counted is read with the feature `inspect` (`Renderer::counters`).
     pub struct Field {
         /// Distance of the grid's nodes; ours, by measurement: half as much changes little and has eight times the nodes
         spacing: f32 = 2.0, "particle radii", "1.5 to 3" => |s| (1.5..=3.0).contains(s);
@@ -139,9 +139,12 @@ impl Field {
         let table = plan.array("field directory", words(FIELD_SLOT) * (u64::from(build.slots) + 1));
         let records = plan.array("field bricks", words(FIELD_RECORD) * u64::from(build.capacity));
         let nodes = plan.array("field nodes", words(FIELD_NODE_WORDS) * u64::from(build.capacity));
-        let cells = plan.array("field cells", words(FIELD_CELL_RECORD) * u64::from(build.cell_capacity));
+        // Strays are listed where there will be cells: two words each.
+        let room = words(FIELD_CELL_RECORD) * u64::from(build.cell_capacity);
+        let cells = plan.array("field cells", room.max(words(2) * u64::from(build.count)));
         let balls = plan.array("field balls", words(FIELD_BALL) * u64::from(build.ball_capacity));
-        for zeros in [head, table, records, nodes] {
+        let strays = plan.buffer("field strays", size_of::<FieldStrays>() as u64);
+        for zeros in [head, table, records, nodes, strays] {
             plan.fill("field", zeros, 0, vk::WHOLE_SIZE, 0);
         }
         let building = Building { head, table, records, nodes, points: points.points, build };
@@ -150,7 +153,10 @@ impl Field {
             let extent = points.extent.unwrap_or(points.points);
             call.read("extent", extent).constant("ORIGIN_ON_DEVICE", points.extent.is_some())
         };
-        let mark = from_origin(building.call(&FIELD_MARK_COMP)).read("points", points.points);
+        let mark = from_origin(building.call(&FIELD_MARK_COMP))
+            .read("points", points.points)
+            .update("strays", strays)
+            .write("stray", cells);
         plan.dispatch("field", mark, per_particle(build.count));
         let number = from_origin(building.call(&FIELD_NUMBER_COMP))
             .update("head", head)
@@ -158,14 +164,22 @@ impl Field {
             .update("records", records);
         plan.dispatch("field", number, per_particle(build.slots));
         add(plan, &building);
+        let of_strays = Groups::Indirect(strays, 0);
+        let lack = building.adding(&FIELD_LACK_COMP).read("strays", strays).update("stray", cells);
+        plan.dispatch("field", lack, of_strays);
+        let across = Field::across(&build);
+        let raise = building.adding(&FIELD_RAISE_COMP).read("strays", strays).read("stray", cells);
+        plan.dispatch("field", raise.constant("ACROSS", across), of_strays);
         let list = building
             .call(&FIELD_LIST_COMP)
             .update("head", head)
             .read("points", points.points)
             .update("records", records)
             .read("nodes", nodes)
+            .read("strays", strays)
+            .read("stray", cells)
             .write("balls", balls);
-        plan.dispatch("field", list, per_particle(build.count));
+        plan.dispatch("field", list, of_strays);
         let finish = building
             .call(&FIELD_FINISH_COMP)
             .read("head", head)
@@ -184,13 +198,7 @@ impl Filling for Field {
 
     fn record(&self, plan: &mut Plan, scene: &Scene, points: &Points) -> Volume {
         self.build_by(plan, scene, points, |plan, building| {
-            let scatter = Call::compute(&FIELD_SCATTER_COMP)
-                .read("head", building.head)
-                .read("table", building.table)
-                .read("points", building.points)
-                .update("nodes", building.nodes)
-                .push_all(&building.build)
-                .constant("ACROSS", Field::across(&building.build));
+            let scatter = building.adding(&FIELD_SCATTER_COMP).constant("ACROSS", Field::across(&building.build));
             plan.dispatch("field", scatter, per_particle(building.build.count));
         })
     }
@@ -210,5 +218,15 @@ impl Building {
     /// One of its passes.
     fn call(&self, shader: &'static Shader) -> Call {
         Call::compute(shader).update("table", self.table).push_all(&self.build).counting(&COUNTED)
+    }
+
+    /// One that looks at points and nodes, and counts nothing.
+    fn adding(&self, shader: &'static Shader) -> Call {
+        Call::compute(shader)
+            .read("head", self.head)
+            .read("table", self.table)
+            .read("points", self.points)
+            .update("nodes", self.nodes)
+            .push_all(&self.build)
     }
 }

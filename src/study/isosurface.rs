@@ -33,7 +33,8 @@ struct Nodes {
 }
 
 impl Nodes {
-    fn new(points: &[Vec4], balls: &[DVec3], lattice: &Lattice) -> Nodes {
+    /// Of points with what each adds where its kernel is 1.
+    fn new(points: &[Vec4], shares: &[f64], balls: &[DVec3], lattice: &Lattice) -> Nodes {
         let mut reach: HashMap<Place, Reached> = HashMap::new();
         let mut reached = |x: DVec3, by: f64, note: &dyn Fn(&mut Reached)| {
             let [low, high] = [x - by, x + by].map(|x| (x / f64::from(EDGE)).floor().as_ivec3());
@@ -65,8 +66,8 @@ impl Nodes {
                     }
                 }
             };
-            for point in own.iter().map(|i| &points[*i]) {
-                let share = |node: IVec3| lattice.share(point, lattice.node(node.to_array()));
+            for (point, share) in own.iter().map(|i| (&points[*i], shares[*i])) {
+                let share = |node: IVec3| share * lattice.kernel(point, lattice.node(node.to_array()));
                 each(place(point), lattice.support / lattice.spacing, &|sum, node| *sum += share(node));
             }
             for center in balls_of.iter().map(|i| balls[*i]) {
@@ -112,7 +113,12 @@ pub fn isosurface(points: &[Point], radius: f32) -> Result<Mesh, ReconstructErro
     let (splash, body): (Vec<&Point>, Vec<&Point>) = points.iter().partition(|p| p.is_ball());
     let body: Vec<Vec4> = body.iter().map(|p| (p.position * unit).extend(p.density)).collect();
     let balls: Vec<DVec3> = splash.iter().map(|p| (p.position * unit).as_dvec3() / lattice.spacing).collect();
-    let nodes = Nodes::new(&body, &balls, &lattice);
+    let mut shares: Vec<f64> = body.iter().map(|p| lattice.share(p)).collect();
+    let sums = Nodes::new(&body, &shares, &[], &lattice);
+    for (point, share) in body.iter().zip(&mut shares) {
+        *share += lattice.raise(point, |node| sums.at(node.into()));
+    }
+    let nodes = Nodes::new(&body, &shares, &balls, &lattice);
     let low = nodes.blocks.keys().fold(IVec3::MAX, |low, b| low.min(IVec3::from(*b)));
     let high = nodes.blocks.keys().fold(IVec3::MIN, |high, b| high.max(IVec3::from(*b) + 1));
     let (first, cells) = (EDGE * low - 1, (EDGE * (high - low)).to_array().map(|n| i64::from(n) + 1));

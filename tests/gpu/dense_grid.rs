@@ -13,7 +13,7 @@ use meniscus::{
         dense_grid::{DenseGrid, twin::inside},
         field::{
             Field,
-            twin::{Lattice, node_of},
+            twin::{Lattice, Node, node_of},
         },
     },
     prepare::{Options, Search},
@@ -31,9 +31,9 @@ fn nodes(grid: DenseGrid, [x, y, z]: [u32; 3]) -> DenseGrid {
     grid.nodes_x(x).nodes_y(y).nodes_z(z)
 }
 
-/// Sums are floats of 24 bits, rounded once to whole numbers; shares as of the field.
-fn rounding(count: f64, sum: f64) -> f64 {
-    (3e-6 + 6e-8 * count) * sum + 0.51
+/// Sums are floats of 24 bits, rounded once to whole numbers; shares as of the field. What strays add is whole numbers, and follows from these sums.
+fn rounding(node: &Node) -> f64 {
+    (3e-6 + 6e-8 * f64::from(node.points)) * node.field + 0.51 + 0.51 * f64::from(node.raised) + 2.0 * node.raises
 }
 
 fn left_out(shot: &Shot) -> [u32; 3] {

@@ -11,7 +11,7 @@ use meniscus::{
         Layers,
         field::{
             Field,
-            twin::{Brick, Corner, Lattice, Place, Words, corner, enclosed, node_of, whole},
+            twin::{Brick, Corner, Lattice, Node, Place, Words, corner, node_of, whole},
         },
     },
     prepare::{Input, Options, Search, points, prepare},
@@ -109,11 +109,12 @@ pub fn clouds() -> Vec<(&'static str, f32, Vec<Vec3>)> {
     ]
 }
 
-/// What a node may be off by, of so many points and such a sum.
-type Rounding = dyn Fn(f64, f64) -> f64;
+/// What a node may be off by, its field in whole numbers.
+type Rounding = dyn Fn(&Node) -> f64;
 
-/// Shares that are whole numbers, and their float arithmetic.
-const WHOLE_SHARES: &Rounding = &|count, sum| 0.7 * count + 3e-6 * sum + 1.0;
+/// Shares that are whole numbers, and their float arithmetic. What a stray adds follows from a mean of sums that are off in the same way.
+const WHOLE_SHARES: &Rounding =
+    &|node| 0.7 * f64::from(node.points + node.raised) + 3e-6 * node.field + 1.0 + node.raises + node.behind;
 
 /// Compares a field with its twin. `added`: of the points those whose shares it has.
 pub fn check(shot: &Shot, [points, added]: [&[Vec4]; 2], lattice: &Lattice, rounding: &Rounding, label: &str) {
@@ -130,23 +131,21 @@ pub fn check(shot: &Shot, [points, added]: [&[Vec4]; 2], lattice: &Lattice, roun
     assert_eq!(left_out.map(|name| shot.counter(name)), [0; 3], "{label}");
 
     // The field at each node.
-    let wanted = lattice.nodes(added);
+    let mut wanted = lattice.nodes(points, added);
     let (mut worst, mut inside) = (0f64, 0);
     let one = f64::from(FIELD_ONE);
+    wanted.values_mut().for_each(|node| node.field *= one);
     for (place, brick) in &bricks {
         for (k, found) in brick.nodes.iter().enumerate() {
             let node = [0, 1, 2].map(|axis| 4 * place[axis] + (k >> (2 * axis) & 3) as i32);
-            let (sum, count) = wanted.get(&node).copied().unwrap_or_default();
-            let sum = one * sum;
-            let off = (f64::from(*found) - sum).abs() / rounding(f64::from(count), sum);
-            assert!(off <= 1.0, "{label}: node {node:?} of {count} points holds {found} instead of {sum}");
+            let wanted = wanted.get(&node).copied().unwrap_or_default();
+            let off = (f64::from(*found) - wanted.field).abs() / rounding(&wanted);
+            assert!(off <= 1.0, "{label}: node {node:?} holds {found} instead of {wanted:?}");
             worst = worst.max(off);
-            inside += usize::from(sum >= one * lattice.level);
+            inside += usize::from(wanted.field >= one * lattice.level);
         }
     }
-    let lost = wanted.iter().find(|(node, (sum, count))| {
-        one * sum > rounding(f64::from(*count), one * sum) && node_of(&bricks, **node) == 0
-    });
+    let lost = wanted.iter().find(|(place, node)| node.field > rounding(node) && node_of(&bricks, **place) == 0);
     assert!(lost.is_none(), "{label}: {lost:?}");
 
     // What follows from the nodes.
@@ -187,7 +186,7 @@ pub fn check(shot: &Shot, [points, added]: [&[Vec4]; 2], lattice: &Lattice, roun
     for point in points.iter().filter(|p| p.w != 0.0) {
         let x = point.truncate().as_dvec3() / lattice.spacing;
         // Splashes, and what the field does not enclose.
-        let enclosed = enclosed(&bricks, lattice, x, f64::from(point.w.abs()));
+        let enclosed = lattice.encloses(point, |node| f64::from(node_of(&bricks, node)) / one);
         if point.w > 0.0 && enclosed > 1.0001 {
             continue;
         }

@@ -5,7 +5,10 @@ use glam::{DVec3, IVec3};
 use meniscus::{
     host::Session,
     layers::field::twin::{Lattice, Words},
-    shader::{FIELD_CROWD, FIELD_DENSEST, FIELD_ONE, FIELD_RIM, FIELD_SLOT, FIELD_THIN, FIELD_THINNED},
+    shader::{
+        FIELD_BEYOND, FIELD_CROWD, FIELD_DENSEST, FIELD_ENOUGH, FIELD_ONE, FIELD_RAISED, FIELD_RIM, FIELD_SLOT,
+        FIELD_SURE, FIELD_THIN, FIELD_THINNED, FIELD_TIP,
+    },
 };
 use serde_json::{Value, json};
 use std::error::Error;
@@ -69,6 +72,8 @@ fn about(spacing: f64, lattice: &Lattice, job: &Job) -> Value {
         "held": "of each cell that holds the surface, in the order of bricks and bits, a byte at its corners z, y, x: the density times 128 / level, rounded down, 255 at most; field_gradients: z, y, x, axis, central differences times spacing times 127 / 0.75, scaled to 127 at most",
         "directory": "a block of 4 x 4 x 4 bricks a slot, the last slot empty: its key, 0 where the slot is free; the number of its first brick (field_numbers), after which its others follow; bits of its bricks, x + 4 y + 16 z, two words each: those that there are, that hold the surface, into which balls reach; its place, by which brick coordinates are 4 times that",
         "points": "x, y, z, number density as a part of a filled body's, negative for balls, 0 where nothing is",
-        "field": format!("sum over points of positive density r of W(distance / support) / (filled_weights max(min(r, e, {FIELD_DENSEST}), {FIELD_CROWD} r)), W(q) = max(1 - q^2, 0)^2, e = max({FIELD_RIM} - {FIELD_THINNED} ({FIELD_RIM} - r), {FIELD_THIN})"),
+        "field": format!("sum over points of positive density r of s W(distance / support), s = 1 / (filled_weights max(min(r, e, {FIELD_DENSEST}), {FIELD_CROWD} r)), W(q) = max(1 - q^2, 0)^2, e = max({FIELD_RIM} - {FIELD_THINNED} ({FIELD_RIM} - r), {FIELD_THIN})"),
+        "raised": format!("and once more over those of r < {FIELD_SURE}, with min({FIELD_RAISED} ({:.4} level - f) / w, s) in place of s, where that is positive: f is the sum at the point, trilinear between nodes, for r < {FIELD_TIP} less {FIELD_BEYOND} radii times the length of its gradient there; w is W so", 1.0 + FIELD_ENOUGH),
+        "balls": format!("points of negative density; of these raised ones those at which f, of the field that is now, is less than the level"),
     })
 }

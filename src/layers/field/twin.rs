@@ -4,10 +4,10 @@ use super::{Field, kernel, rest};
 use crate::{
     shader::{
         FIELD_BALL, FIELD_BALL_BELOW, FIELD_BALL_BITS, FIELD_BALL_STEPS, FIELD_BALLS, FIELD_BEYOND, FIELD_BRICK,
-        FIELD_CELL_RECORD, FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_FIRST_BALL, FIELD_FIRST_BRICK,
+        FIELD_CELL_RECORD, FIELD_CELLS, FIELD_CROWD, FIELD_DENSEST, FIELD_ENOUGH, FIELD_FIRST_BALL, FIELD_FIRST_BRICK,
         FIELD_FIRST_CELL, FIELD_HALF, FIELD_INSIDE, FIELD_NODE_WORDS, FIELD_NODES, FIELD_ONE, FIELD_PLACE,
-        FIELD_PROBES, FIELD_RECORD, FIELD_RIM, FIELD_SLOT, FIELD_STEEPEST, FIELD_SURE, FIELD_SURFACE, FIELD_THERE,
-        FIELD_THIN, FIELD_THINNED, FIELD_TIP, SPLASH_RADIUS,
+        FIELD_PROBES, FIELD_RAISED, FIELD_RECORD, FIELD_RIM, FIELD_SLOT, FIELD_STEEPEST, FIELD_SURE, FIELD_SURFACE,
+        FIELD_THERE, FIELD_THIN, FIELD_THINNED, FIELD_TIP, SPLASH_RADIUS,
     },
     space::power_of_two,
 };
@@ -51,34 +51,95 @@ impl Lattice {
         IVec3::from(node).as_dvec3() * self.spacing
     }
 
-    /// What a point adds to the field at a position: W / rho.
-    pub fn share(&self, point: &Vec4, position: DVec3) -> f64 {
+    /// What a point adds to the field where its kernel is 1: 1 / rho.
+    pub fn share(&self, point: &Vec4) -> f64 {
         let density = f64::from(point.w);
         if density <= 0.0 {
             return 0.0;
         }
         let rim = (FIELD_RIM - FIELD_THINNED * (FIELD_RIM - point.w)).max(FIELD_THIN);
         let divisor = density.min(f64::from(rim.min(FIELD_DENSEST))).max(f64::from(FIELD_CROWD) * density);
-        kernel(position.distance(point.truncate().as_dvec3()) / self.support) / (self.rest * divisor)
+        (self.rest * divisor).recip()
     }
 
-    /// Each node that a point reaches, with the field there and how many points that is of.
-    pub fn nodes(&self, points: &[Vec4]) -> BTreeMap<Place, (f64, u32)> {
-        let mut all = BTreeMap::new();
+    /// A point's kernel at a position.
+    pub fn kernel(&self, point: &Vec4, position: DVec3) -> f64 {
+        kernel(position.distance(point.truncate().as_dvec3()) / self.support)
+    }
+
+    /// How far the field encloses one of its particles, as a part of the level, or surely; from its values at nodes.
+    pub fn encloses(&self, point: &Vec4, at: impl Fn(Place) -> f64) -> f64 {
+        if point.w >= FIELD_SURE {
+            return f64::INFINITY;
+        }
+        let x = point.truncate().as_dvec3() / self.spacing;
+        let first = x.floor();
+        let node = |step: IVec3| at((first.as_ivec3() + step).to_array());
+        let f = |part: DVec3| -> f64 { weights(part).map(|(step, weight)| weight * node(step)).sum() };
+        let part = x - first;
+        // Along an axis what is trilinear is straight.
+        let slope = |axis: usize| {
+            let [mut low, mut high] = [part; 2];
+            (low[axis], high[axis]) = (0.0, 1.0);
+            f(high) - f(low)
+        };
+        let radius = self.ball / self.spacing / f64::from(SPLASH_RADIUS);
+        let beyond = if point.w < FIELD_TIP { f64::from(FIELD_BEYOND) * radius } else { 0.0 };
+        (f(part) - beyond * DVec3::from([0, 1, 2].map(slope)).length()) / self.level
+    }
+
+    /// What one of its particles adds besides where its kernel is 1, since the sum of all shares does not enclose it.
+    pub fn raise(&self, point: &Vec4, at: impl Fn(Place) -> f64) -> f64 {
+        let lacking = self.level * (1.0 + f64::from(FIELD_ENOUGH) - self.encloses(point, at));
+        let x = point.truncate().as_dvec3() / self.spacing;
+        let first = x.floor();
+        let kernel = |step: IVec3| self.kernel(point, (first + step.as_dvec3()) * self.spacing);
+        let own: f64 = weights(x - first).map(|(step, weight)| weight * kernel(step)).sum();
+        if lacking > 0.0 { (f64::from(FIELD_RAISED) * lacking / own).min(self.share(point)) } else { 0.0 }
+    }
+
+    /// Each node that a point reaches. `added`: of all points those whose shares are in it.
+    pub fn nodes(&self, points: &[Vec4], added: &[Vec4]) -> BTreeMap<Place, Node> {
+        let mut all: BTreeMap<Place, Node> = BTreeMap::new();
+        for point in added.iter().filter(|p| p.w > 0.0) {
+            self.each_reached(point, |node, kernel| {
+                let node = all.entry(node).or_default();
+                node.field += self.share(point) * kernel;
+                node.points += 1;
+            });
+        }
+        let shares = all.clone();
+        let at = |node: Place| shares.get(&node).map_or(0.0, |n| n.field);
         for point in points.iter().filter(|p| p.w > 0.0) {
-            let x = point.truncate().as_dvec3();
-            let low = ((x - self.support) / self.spacing).floor().as_ivec3();
-            let high = ((x + self.support) / self.spacing).ceil().as_ivec3();
-            for node in places(low, high) {
-                let share = self.share(point, self.node(node));
-                if share > 0.0 {
-                    let (sum, count) = all.entry(node).or_insert((0.0, 0));
-                    *sum += share;
-                    *count += 1;
-                }
+            let raise = self.raise(point, at);
+            let first = (point.truncate().as_dvec3() / self.spacing).floor().as_ivec3();
+            let around = places(first, first + 1).filter_map(|node| shares.get(&node));
+            let behind = around.map(|n| n.points).max().unwrap_or(0);
+            // Rounding decides whether it is a little or nothing.
+            if raise > 0.0 || self.encloses(point, at) < 1.1 {
+                self.each_reached(point, |node, kernel| {
+                    let node = all.entry(node).or_default();
+                    node.field += raise * kernel;
+                    node.raised += 1;
+                    node.raises += kernel;
+                    node.behind += f64::from(behind) * kernel;
+                });
             }
         }
         all
+    }
+
+    /// The nodes that a point reaches, and its kernel there.
+    fn each_reached(&self, point: &Vec4, mut each: impl FnMut(Place, f64)) {
+        let x = point.truncate().as_dvec3();
+        let low = ((x - self.support) / self.spacing).floor().as_ivec3();
+        let high = ((x + self.support) / self.spacing).ceil().as_ivec3();
+        for node in places(low, high) {
+            let kernel = self.kernel(point, self.node(node));
+            if kernel > 0.0 {
+                each(node, kernel);
+            }
+        }
     }
 
     /// Bricks whose cells lie nearer to a point than it reaches, plus so much more.
@@ -97,6 +158,21 @@ impl Lattice {
         };
         places(low, high).filter(|brick| distance(brick) < reach).collect()
     }
+}
+
+/// The field at a node, and what rounding in it comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Node {
+    /// As a part of a filled body's.
+    pub field: f64,
+    /// How many points it is of.
+    pub points: u32,
+    /// How many of these add more;
+    pub raised: u32,
+    /// their kernels there;
+    pub raises: f64,
+    /// and of how many points the sums are that this follows from, by the same kernels.
+    pub behind: f64,
 }
 
 /// All from one corner to the other, both included.
@@ -273,27 +349,6 @@ pub fn slope(corner: &Corner) -> DVec3 {
 /// Two words as one, the lower bits first.
 fn bits(words: &[u32]) -> u64 {
     u64::from(words[0]) | u64::from(words[1]) << 32
-}
-
-/// Whether the field encloses one of its particles with this density, at x in spacings: there by how much, as a part of the
-/// level, or surely. One that it does not is a ball, too.
-pub fn enclosed(bricks: &BTreeMap<Place, Brick>, lattice: &Lattice, x: DVec3, density: f64) -> f64 {
-    if density >= f64::from(FIELD_SURE) {
-        return f64::INFINITY;
-    }
-    let first = x.floor();
-    let node = |step: IVec3| f64::from(node_of(bricks, (first.as_ivec3() + step).to_array())) / f64::from(FIELD_ONE);
-    let f = |part: DVec3| -> f64 { weights(part).map(|(step, weight)| weight * node(step)).sum() };
-    let part = x - first;
-    // Along an axis what is trilinear is straight.
-    let slope = |axis: usize| {
-        let [mut low, mut high] = [part; 2];
-        (low[axis], high[axis]) = (0.0, 1.0);
-        f(high) - f(low)
-    };
-    let radius = lattice.ball / lattice.spacing / f64::from(SPLASH_RADIUS);
-    let beyond = if density < f64::from(FIELD_TIP) { f64::from(FIELD_BEYOND) * radius } else { 0.0 };
-    (f(part) - beyond * DVec3::from([0, 1, 2].map(slope)).length()) / lattice.level
 }
 
 /// The field at a node times [`FIELD_ONE`], from bricks; 0 where there is none.
