@@ -225,17 +225,30 @@ bool cross_cubes(inout Course c, bool go, vec3 low, float span, uvec2 stops, out
     return go && (place & beyond) == 0u;
 }
 
+// `side` times the field less its level along a ray's way through the cell in which it is: at its beginning, after a third and two thirds, and at its
+// end, which is when the ray leaves the cell, and on which axes.
+vec4 along_cell(Course c, float side, uint cell, out float end, out bvec3 axes) {
+    uvec4 corners = cell_words(cell, 0u);
+    vec4 low = held(corners.x), high = held(corners.y);
+    vec3 border = (c.cell + c.ahead - c.x) * c.per_dir;
+    float out_of = min(border.x, min(border.y, border.z));
+    end = max(out_of, c.t);
+    axes = equal(border, vec3(out_of));
+    vec3 from = c.x + c.t * c.dir - c.cell, way = (end - c.t) * c.dir;
+    return side * vec4(trilinear(low, high, from), trilinear(low, high, from + way / 3.0), trilinear(low, high, from + way * (2.0 / 3.0)),
+                       trilinear(low, high, from + way));
+}
+
 // The first wall that a ray meets from x on, from t to `reach`: of the field from within it, or from outside of all liquid of whichever
 // comes first. Without one its t is NONE, and `stopped` says whether steps ran out.
 Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float reach, out bool stopped) {
-    Wall wall = Wall(NONE, CLASS_BODY, vec3(0.0), 0u, 0u), found = wall;
+    Wall wall = Wall(NONE, CLASS_BODY, vec3(0.0), 0u, 0u);
     float side = inside ? 1.0 : -1.0;
     vec3 per_dir = 1.0 / mix(dir, vec3(1e-20), lessThan(abs(dir), vec3(1e-20)));
     Course c = Course(x, dir, per_dir, vec3(greaterThan(per_dir, vec3(0.0))), t, floor(x + t * dir));
-    bool own = false, first = true, met = false;
-    // The cell in which it meets the field's: from when to when the ray is in it, the cubic there, and its bracket.
-    vec2 times = vec2(0.0), bracket = vec2(0.0);
-    vec4 cubic = vec4(0.0);
+    // Whether it has been on its side: so far, and when it came into the cell where it meets the field's wall.
+    bool own = false, before = false, first = true, met = false;
+    uint cell = 0u, ball = 0u;
     uint steps = 0u;
     while (!met && c.t < min(reach, wall.t) && steps < FIELD_STEPS) {
         // On to a brick that holds the surface, from outside also to one into which balls reach; or to the next block.
@@ -246,42 +259,40 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
         uvec4 words = stop ? brick_words(block.first + field_before(block.there, k)) : uvec4(0u);
         uvec2 surface = stop && field_bit(block.surfaces, k) ? words.xy : uvec2(0u);
         vec3 brick = BRICK_EDGE * floor(c.cell / BRICK_EDGE);
-        if (!inside) meet_balls(words[FIELD_FIRST_BALL], brick, x, dir, wall);
+        ball = words[FIELD_FIRST_BALL];
+        if (!inside) meet_balls(ball, brick, x, dir, wall);
         // In it from cell to cell of those that hold the surface: CPUs do without looking up block and brick each time.
         bool in_brick = true;
         while (in_brick) {
             in_brick = cross_cubes(c, stop, brick, BRICK_EDGE, surface, k, first) && c.t < min(reach, wall.t);
             if (in_brick) {
-                uint cell = words[FIELD_FIRST_CELL] + field_before(surface, k);
-                uvec4 corners = cell_words(cell, 0u);
-                vec4 low = held(corners.x), high = held(corners.y);
-                vec3 place = c.cell, border = (place + c.ahead - x) * per_dir;
-                float begin = c.t, out_of = min(border.x, min(border.y, border.z)), end = max(out_of, begin);
-                vec3 from = x + begin * dir - place, along = (end - begin) * dir;
-                vec4 h = side * vec4(trilinear(low, high, from), trilinear(low, high, from + along / 3.0),
-                                     trilinear(low, high, from + along * (2.0 / 3.0)), trilinear(low, high, from + along));
+                cell = words[FIELD_FIRST_CELL] + field_before(surface, k);
                 own = own || !first;
-                met = falls(h, own, cubic, bracket);
+                before = own;
+                float end;
+                bvec3 axes;
+                vec4 h = along_cell(c, side, cell, end, axes), cubic;
+                vec2 bracket;
                 // A ray that does not come to its side in the cell in which it starts is through at once.
-                if (!met && !own) {
-                    met = true;
-                    bracket = vec2(0.0);
-                }
-                if (met) {
-                    times = vec2(begin, end);
-                    found = Wall(NONE, CLASS_BODY, place, cell, words[FIELD_FIRST_BALL]);
+                met = falls(h, own, cubic, bracket) || !own;
+                if (!met) {
+                    c.t = end;
+                    c.cell = mix(c.cell, c.cell + 2.0 * c.ahead - 1.0, axes);
                 }
                 first = false;
-                c.t = end;
-                c.cell = mix(place, place + 2.0 * c.ahead - 1.0, equal(border, vec3(out_of)));
                 in_brick = !met && BRICK_EDGE * floor(c.cell / BRICK_EDGE) == brick;
             }
         }
     }
     stopped = !met && c.t < min(reach, wall.t);
     if (met) {
-        found.t = mix(times.x, times.y, root_of(cubic, bracket));
-        if (found.t < min(reach, wall.t)) wall = found;
+        // Looked at again, and not carried along.
+        float end;
+        bvec3 axes;
+        vec4 h = along_cell(c, side, cell, end, axes), cubic;
+        vec2 bracket;
+        if (falls(h, before, cubic, bracket)) c.t = mix(c.t, end, root_of(cubic, bracket));
+        if (c.t < min(reach, wall.t)) wall = Wall(c.t, CLASS_BODY, c.cell, cell, ball);
     }
     return wall;
 }
