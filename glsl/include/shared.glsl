@@ -152,7 +152,7 @@
 // Pixels after its start on a wall within which a ray still counts as on its own side.
 #define START_PIXELS 2.0
 // Times that a ray goes straight on from splash to body or back, at most.
-#define MOST_HAND_OVERS 4
+#define MOST_HAND_OVERS 16
 
 // A wall is a surface where |g| is no larger than this, in particle radii,
 #define ACCEPTED 0.05
