@@ -195,32 +195,36 @@ void main() {
 #endif
 
 #if defined(LACK) || defined(LIST)
-// What a particle lacks where it is, so that the field encloses it, in whole numbers of a node; none or less where it is enclosed by
-// more than enough. `own`: what it adds there itself, as a part of what it adds where its kernel is 1.
+// What a particle lacks where it is, so that the field encloses it, in whole numbers of a node; none or less where it does. `own`: what the
+// particle adds there itself, as a part of what it adds where its kernel is 1.
 float lacks(vec4 point, ivec3 base, out float own) {
     Reach r = reach_of(point);
-    // The field between nodes, and its gradient: in mostly one block.
-    float f = 0.0;
-    vec3 gradient = vec3(0.0);
-    own = 0.0;
-    ivec3 first = field_brick(field_brick(r.node));
-    uint left = blocks_up_to(field_brick(field_brick(r.node + 1)) - first);
+    // The bricks of the nodes around it, block by block: mostly they are one block's.
+    uint numbers[8];
+    ivec3 first_block = field_brick(field_brick(r.node));
+    uint left = blocks_up_to(field_brick(field_brick(r.node + 1)) - first_block);
     while (left != 0u) {
-        ivec3 block = first + ahead_of(field_next(left));
+        ivec3 block = first_block + ahead_of(field_next(left));
         uvec4 words;
         field_slot(block, base, build.slots, words);
         for (uint c = 0u; c < 8u; ++c) {
-            ivec3 step = ahead_of(c), node = r.node + step;
-            vec3 weights = mix(1.0 - r.part, r.part, bvec3(step)), away = vec3(step) - r.part;
-            bool here = field_brick(field_brick(node)) == block;
-            uint number = here ? field_number(words, field_local(field_brick(node))) : 0u;
-            uint pair = nodes.at[FIELD_NODE_WORDS * number + field_local(node) / 2u];
-            float sum = here ? float(int(pair >> (16 * (node.x & 1)) & 0xffffu)) : 0.0, weight = here ? weights.x * weights.y * weights.z : 0.0;
-            float within = max(1.0 - dot(away, away) / (build.reach * build.reach), 0.0);
-            f += weight * sum;
-            own += weight * within * within;
-            gradient += mix(vec3(-sum), vec3(sum), bvec3(step)) * weights.yzx * weights.zxy;
+            ivec3 brick = field_brick(r.node + ahead_of(c));
+            if (field_brick(brick) == block) numbers[c] = field_number(words, field_local(brick));
         }
+    }
+    // The field between them, and its gradient.
+    float f = 0.0;
+    vec3 gradient = vec3(0.0);
+    own = 0.0;
+    for (uint c = 0u; c < 8u; ++c) {
+        ivec3 step = ahead_of(c), node = r.node + step;
+        vec3 weights = mix(1.0 - r.part, r.part, bvec3(step)), away = vec3(step) - r.part;
+        uint pair = nodes.at[FIELD_NODE_WORDS * numbers[c] + field_local(node) / 2u];
+        float sum = float(int(pair >> (16 * (node.x & 1)) & 0xffffu)), weight = weights.x * weights.y * weights.z;
+        float within = max(1.0 - dot(away, away) / (build.reach * build.reach), 0.0);
+        f += weight * sum;
+        own += weight * within * within;
+        gradient += mix(vec3(-sum), vec3(sum), bvec3(step)) * weights.yzx * weights.zxy;
     }
     if (point.w < FIELD_TIP) f -= FIELD_BEYOND / SPLASH_RADIUS * build.ball * length(gradient);
     return float(build.level) - f;

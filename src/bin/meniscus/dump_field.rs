@@ -74,6 +74,6 @@ fn about(spacing: f64, lattice: &Lattice, job: &Job) -> Value {
         "points": "x, y, z, number density as a part of a filled body's, negative for balls, 0 where nothing is",
         "field": format!("sum over points of positive density r of s W(distance / support), s = 1 / (filled_weights max(min(r, e, {FIELD_DENSEST}), {FIELD_CROWD} r)), W(q) = max(1 - q^2, 0)^2, e = max({FIELD_RIM} - {FIELD_THINNED} ({FIELD_RIM} - r), {FIELD_THIN})"),
         "raised": format!("and once more over those of r < {FIELD_SURE}, with min({FIELD_RAISED} ({:.4} level - f) / w, s) in place of s, where that is positive: f is the sum at the point, trilinear between nodes, for r < {FIELD_TIP} less {FIELD_BEYOND} radii times the length of its gradient there; w is W so", 1.0 + FIELD_ENOUGH),
-        "balls": format!("points of negative density; of these raised ones those at which f, of the field that is now, is less than the level"),
+        "balls": "points of negative density, and those raised ones at which f, of the field that it is then, is less than the level",
     })
 }
