@@ -41,7 +41,7 @@ const PLAIN: Kind = Kind {
 };
 /// Lavapipe of Mesa 22.3 makes constants of uniforms that a branch hangs on alone, and does so in every frame where that changes
 /// a shader's size enough; how much is enough differs from shader to shader. Of what can be planted, only a loop in the shader
-/// of the second kind has been seen to be compiled anew (tests/mutants.txt); the other kinds are there for what other drivers do.
+/// of the second kind has been seen to be compiled anew (tests/mutants/); the other kinds are there for what other drivers do.
 const KINDS: [Kind; 17] = [
     Kind { name: "one refraction", refractions: 1, ..PLAIN },
     Kind { name: "one refraction, debug", refractions: 1, debug: true, ..PLAIN },

@@ -1,12 +1,15 @@
 #!/usr/bin/env bash
-# Plants each mistake of tests/mutants.txt in turn and checks that the test named beside it fails, having passed before. Half a
-# minute each, so CI plants a few of them at a time. Works on a copy: your tree is not touched.
+# Plants each mistake of tests/mutants/ in turn and checks that the test named beside it fails, having passed before. Half a
+# minute each, so CI plants a few of them at a time. Works on a copy: your tree is not touched. A line is file, text, what replaces it,
+# test (of `--test gpu`; with `cpu::`, `cli::`, `view::`, `memory::` or `endurance::` before it of those, with `lib::` of the library, with
+# `capi::` and `capilib::` of the C interface, with `wgpu::` and `wgpulib::` of the host in wgpu, with `tracy::` and `tracylib::` of those with
+# that feature), separated by " ::: ".
 #   tests/mutants.sh                    all of them
 #   tests/mutants.sh PATTERN            lines that the extended regular expression finds
 #   tests/mutants.sh --sample 3 [DAY]   three of them: other ones each day (days since 1970 unless given), all in turn
 set -euo pipefail
 cd "$(dirname "$0")/.."
-mapfile -t lines < <(grep -v '^#' tests/mutants.txt | grep .)
+mapfile -t lines < <(grep -hv '^#' tests/mutants/*.txt | grep .)
 if [ "${1:-}" = --sample ]; then
   day=${3:-$(($(date +%s) / 86400))} all=("${lines[@]}") lines=()
   # Lines of one file lie together: steps of about a third of the list make a sample of different ones.

@@ -30,7 +30,7 @@ parameters! {
         /// Distance of the grid's nodes, as of `field`
         spacing: f32 = 2.0, "particle radii", "1.5 to 3" => |s| (1.5..=3.0).contains(s);
         /// How far a particle reaches, as of `field`
-        kernel_radius: f32 = 4.5, "particle radii", "2.5 to 5" => |k| (2.5..=5.0).contains(k);
+        kernel_radius: f32 = 4.0, "particle radii", "2.5 to 5" => |k| (2.5..=5.0).contains(k);
         /// Density of the surface, as a part of a filled body's; as of `field`
         level: f32 = 0.57, "", "0.05 to 0.95" => |l| (0.05..=0.95).contains(l);
         /// What there is room for of the bricks in which rays find the surface, as of `field`

@@ -13,7 +13,7 @@ use crate::{
     prepare::lattice,
     scene::Scene,
     shader::{
-        FIELD_BALL, FIELD_CELL_RECORD, FIELD_FAR, FIELD_FINISH_COMP, FIELD_LACK_COMP, FIELD_LIST_COMP, FIELD_MARK_COMP,
+        FIELD_BALL, FIELD_CELL_RECORD, FIELD_CELLS_COMP, FIELD_FAR, FIELD_LACK_COMP, FIELD_LIST_COMP, FIELD_MARK_COMP,
         FIELD_MOST_BRICKS, FIELD_NODE_WORDS, FIELD_NODES, FIELD_NUMBER_COMP, FIELD_ONE, FIELD_RAISE_COMP, FIELD_RECORD,
         FIELD_SCATTER_COMP, FIELD_SLOT, FieldBuild, FieldHead, FieldStrays, SPLASH_RADIUS, Shader,
     },
@@ -29,7 +29,7 @@ parameters! {
         /// Distance of the grid's nodes; ours, by measurement: half as much changes little and has eight times the nodes
         spacing: f32 = 2.0, "particle radii", "1.5 to 3" => |s| (1.5..=3.0).contains(s);
         /// How far a particle reaches; ours, by measurement
-        kernel_radius: f32 = 4.5, "particle radii", "2.5 to 5" => |k| (2.5..=5.0).contains(k);
+        kernel_radius: f32 = 4.0, "particle radii", "2.5 to 5" => |k| (2.5..=5.0).contains(k);
         /// Density of the surface, as a part of a filled body's; ours: it lies one radius above the outermost particles
         level: f32 = 0.57, "", "0.05 to 0.95" => |l| (0.05..=0.95).contains(l);
         /// What there is room for in proportion to the particles, whose own volume is (2 r)³ each: bricks of 64 nodes. Bricks
@@ -180,13 +180,13 @@ impl Field {
             .read("stray", cells)
             .write("balls", balls);
         plan.dispatch("field", list, of_strays);
-        let finish = building
-            .call(&FIELD_FINISH_COMP)
+        let surface = building
+            .call(&FIELD_CELLS_COMP)
             .read("head", head)
             .update("records", records)
             .read("nodes", nodes)
             .write("cells", cells);
-        plan.dispatch("field", finish, Groups::Indirect(head, 0));
+        plan.dispatch("field", surface, Groups::Indirect(head, 0));
         Volume { head, table, records, cells, balls, build, spacing: self.spacing }
     }
 }

@@ -169,7 +169,7 @@ fn corners_of(brick: &Brick, bit: u32) -> Option<&[Corner; 8]> {
 
 /// The field less its level.
 fn above(corners: &[Corner; 8], f: DVec3) -> f64 {
-    between(corners, f, |corner| DVec3::splat(held(corner))).x
+    between(corners, f, |corner| DVec3::splat(held(corner.0))).x
 }
 
 /// Where the field rises through its level along a ray's way through a cell; places are counted from its first node.
@@ -190,5 +190,5 @@ fn rises(corners: &[Corner; 8], x: DVec3, dir: DVec3, from: f64, to: f64) -> Opt
 }
 
 fn normal(corners: &[Corner; 8], f: DVec3) -> DVec3 {
-    -between(corners, f, slope).normalize_or(DVec3::NEG_Y)
+    -between(corners, f, |corner| slope(corner.1)).normalize_or(DVec3::NEG_Y)
 }

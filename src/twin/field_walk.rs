@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     Equirect, Fresnel,
-    layers::field::twin::{Brick, Corner, Place, corner_of, held, slope, weights, whole},
+    layers::field::twin::{Brick, Place, byte, held, node_of, slope, slopes, weights, whole},
     optics::walk::Walk as Rays,
     shader::{
         BOX_MARGIN, CLASS_BODY, CLASS_SPLASH, FIELD_BRICK, FIELD_NUDGE, OUTCOME_HIT, OUTCOME_NO_LIQUID,
@@ -52,8 +52,8 @@ impl<'a> Field<'a> {
         Field { bricks, base, part, spacing, level, balls: balls.collect() }
     }
 
-    fn node(&self, node: IVec3) -> Corner {
-        corner_of(self.bricks, whole(self.level), (node + IVec3::from(self.base)).to_array())
+    fn sum(&self, node: IVec3) -> u32 {
+        node_of(self.bricks, (node + IVec3::from(self.base)).to_array())
     }
 
     /// Trilinear between nodes of which each has some value.
@@ -64,12 +64,12 @@ impl<'a> Field<'a> {
 
     /// The field less its level, in 1/256 of twice the level.
     pub fn at(&self, x: DVec3) -> f64 {
-        self.between(x, |node| DVec3::splat(held(&self.node(node)))).x
+        self.between(x, |node| DVec3::splat(held(byte(whole(self.level), self.sum(node))))).x
     }
 
     /// Its gradient, in no unit: trilinear between what nodes hold.
     pub fn gradient(&self, x: DVec3) -> DVec3 {
-        self.between(x, |node| slope(&self.node(node)))
+        self.between(x, |node| slope(slopes(|step| self.sum(node + step))))
     }
 
     fn ball_radius(&self) -> f64 {

@@ -69,7 +69,7 @@ fn about(spacing: f64, lattice: &Lattice, job: &Job) -> Value {
         "ball_radius": lattice.ball / lattice.spacing * spacing,
         "nodes": "node (i, j, k) lies at origin + (i, j, k) spacing; brick (x, y, z) has those from 4 (x, y, z) on; field_nodes: brick, z, y, x",
         "flags": "1: some cells hold the surface (field_cells, bit x + 4 y + 16 z); 2: balls reach into it",
-        "held": "of each cell that holds the surface, in the order of bricks and bits, a byte at its corners z, y, x: the density times 128 / level, rounded down, 255 at most; field_gradients: z, y, x, axis, central differences times spacing times 127 / 0.75, scaled to 127 at most",
+        "held": "of each cell that holds the surface, in the order of bricks and bits, a byte at its corners z, y, x: the density times 128 / level, rounded down, 255 at most; field_gradients: z, y, x, axis, central differences of the density, weighted by 3 : 10 : 3 on either other axis, times spacing times 127 / 0.75, scaled to 127 at most",
         "directory": "a block of 4 x 4 x 4 bricks a slot, the last slot empty: its key, 0 where the slot is free; the number of its first brick (field_numbers), after which its others follow; bits of its bricks, x + 4 y + 16 z, two words each: those that there are, that hold the surface, into which balls reach; its place, by which brick coordinates are 4 times that",
         "points": "x, y, z, number density as a part of a filled body's, negative for balls, 0 where nothing is",
         "field": format!("sum over points of positive density r of s W(distance / support), s = 1 / (filled_weights max(min(r, e, {FIELD_DENSEST}), {FIELD_CROWD} r)), W(q) = max(1 - q^2, 0)^2, e = max({FIELD_RIM} - {FIELD_THINNED} ({FIELD_RIM} - r), {FIELD_THIN})"),

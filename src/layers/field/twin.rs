@@ -1,4 +1,4 @@
-//! Twin of `glsl/layers/field.comp`: the density field in 64 bits, from its formula; and what the device has built, read back.
+//! Twin of `glsl/layers/field.comp` and `field_cells.comp`: the density field in 64 bits, from its formula; and what the device has built, read back.
 
 use super::{Field, kernel, rest};
 use crate::{
@@ -184,14 +184,25 @@ fn places(low: IVec3, high: IVec3) -> impl Iterator<Item = Place> {
 /// A node as a walk finds it: the field in a byte, and its gradient.
 pub type Corner = (u8, [i8; 3]);
 
-/// What a walk finds at a node, from the sum that it holds and those before and behind it on each axis.
-pub fn corner(level: u32, sum: u32, [before, behind]: [[u32; 3]; 2]) -> Corner {
-    let held = u64::from(sum) * u64::from(FIELD_HALF) / u64::from(level);
-    let unit = 2.0 * FIELD_STEEPEST as f64 * f64::from(FIELD_ONE);
-    let slope = [0, 1, 2].map(|axis| (f64::from(behind[axis]) - f64::from(before[axis])) / unit);
+/// The field at a node as a walk finds it: in 1/128 of the level, rounded down.
+pub fn byte(level: u32, sum: u32) -> u8 {
+    (u64::from(sum) * u64::from(FIELD_HALF) / u64::from(level)).min(255) as u8
+}
+
+/// Its gradient there, from the sums of the nodes around it, by how far away these are: Scharr's central differences, by 3 : 10 : 3 across.
+pub fn slopes(sum: impl Fn(IVec3) -> u32) -> [i8; 3] {
+    let across = |step: i32| if step == 0 { 10.0 / 16.0 } else { 3.0 / 16.0 };
+    let mut slope = [0.0; 3];
+    for step in places(-IVec3::ONE, IVec3::ONE).map(IVec3::from) {
+        for axis in 0..3 {
+            let [a, b] = [(axis + 1) % 3, (axis + 2) % 3].map(|other| across(step[other]));
+            slope[axis] += f64::from(step[axis]) / 2.0 * a * b * f64::from(sum(step));
+        }
+    }
+    let slope = slope.map(|s| s / (FIELD_STEEPEST as f64 * f64::from(FIELD_ONE)));
     // What is steeper keeps its direction.
     let steepest = slope.iter().fold(1f64, |most, s| most.max(s.abs()));
-    (held.min(255) as u8, slope.map(|s| (127.0 * s / steepest).round() as i8))
+    slope.map(|s| (127.0 * s / steepest).round() as i8)
 }
 
 /// A brick as the device has built it.
@@ -336,14 +347,14 @@ pub fn weights(f: DVec3) -> impl Iterator<Item = (IVec3, f64)> {
     steps.map(move |step| (step, DVec3::select(step.cmpeq(IVec3::ONE), f, 1.0 - f).element_product()))
 }
 
-/// The field less its level, in 1/256 of twice the level: in the middle of what a corner's byte stands for.
-pub fn held(corner: &Corner) -> f64 {
-    f64::from(corner.0) + 0.5 - f64::from(FIELD_HALF)
+/// The field less its level, in 1/256 of twice the level: in the middle of what a node's byte stands for.
+pub fn held(byte: u8) -> f64 {
+    f64::from(byte) + 0.5 - f64::from(FIELD_HALF)
 }
 
 /// Its gradient there, in no unit.
-pub fn slope(corner: &Corner) -> DVec3 {
-    I8Vec3::from(corner.1).as_dvec3()
+pub fn slope(bytes: [i8; 3]) -> DVec3 {
+    I8Vec3::from(bytes).as_dvec3()
 }
 
 /// Two words as one, the lower bits first.
@@ -357,18 +368,6 @@ pub fn node_of(bricks: &BTreeMap<Place, Brick>, node: Place) -> u32 {
     let [x, y, z] = node.map(|c| c.rem_euclid(edge) as usize);
     let edge_nodes = edge as usize;
     bricks.get(&node.map(|c| c.div_euclid(edge))).map_or(0, |b| b.nodes[x + edge_nodes * (y + edge_nodes * z)])
-}
-
-/// The same as a walk finds it.
-pub fn corner_of(bricks: &BTreeMap<Place, Brick>, level: u32, node: Place) -> Corner {
-    let beside = |by: i32| {
-        [0, 1, 2].map(|axis| {
-            let mut other = node;
-            other[axis] += by;
-            node_of(bricks, other)
-        })
-    };
-    corner(level, node_of(bricks, node), [beside(-1), beside(1)])
 }
 
 /// A level or density in the whole numbers of a node.
