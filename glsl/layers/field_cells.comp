@@ -13,13 +13,12 @@ layout(set = 0, binding = 2, std430) buffer TableBlock { uint at[]; } table;
 layout(set = 0, binding = 4, std430) buffer CounterBlock { uint at[]; } counters;
 layout(set = 0, binding = 6, std430) buffer RecordBlock { uint at[]; } records;
 layout(set = 0, binding = 7, std430) readonly buffer NodeBlock { uint at[]; } nodes;
+layout(set = 0, binding = 8, std430) writeonly buffer CellBlock { uint at[]; } cells;
 layout(constant_id = 0) const uint COUNTERS = 0; // slot of the first of the field's counters
 const uint CELLS = 1u, CELLS_LEFT_OUT = 3u;
 
 uvec4 directory_texel(uint i) { return uvec4(table.at[4u * i], table.at[4u * i + 1u], table.at[4u * i + 2u], table.at[4u * i + 3u]); }
 #include "field_directory.glsl"
-
-layout(set = 0, binding = 8, std430) writeonly buffer CellBlock { uint at[]; } cells;
 
 // A group takes several bricks, FIELD_LANES invocations each. Of a brick's nodes those up to two before and beyond them on x, and one before and two
 // beyond on the other axes, as rows of words of two each, in rooms of a power of two; and the corners of its cells.
