@@ -1,5 +1,5 @@
-//! A density field around the particles, whose level is the liquid's surface (`glsl/layers/field.comp`; Iwasaki06, volume-normalised:
-//! docs/methods.md, "Density field"). It does not hang on the view.
+//! A density field around the particles, whose level is the liquid's surface (`glsl/layers/field.comp`, then
+//! `field_cells.comp`; Iwasaki06, volume-normalised: docs/methods.md, "Density field"). It does not hang on the view.
 
 #[cfg(feature = "inspect")]
 pub mod twin;
