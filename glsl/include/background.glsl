@@ -18,7 +18,7 @@ bool meets_scene(Ray ray, out float t, out ivec2 pixel) {
         if (between || (behind <= 0.0 && surface <= d_end && surface < CLEARED)) {
             float k0 = line.inverse_start, k1 = line.inverse_end;
             // At infinity rounding may leave nothing of 1 / d.
-            t = t_at(ray, between || k1 == k0 ? s : clamp((1.0 / surface - k0) / (k1 - k0), s, end));
+            t = t_at(ray, line, between || k1 == k0 ? s : clamp((1.0 / surface - k0) / (k1 - k0), s, end));
             return true;
         }
         in_front = d_end <= surface;

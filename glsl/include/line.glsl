@@ -9,13 +9,6 @@ struct Ray {
 
 ivec2 nearest(vec2 position) { return whole(clamp(floor(position), vec2(0.0), frame.size - 1.0)); }
 
-// t at a screen-space parameter s, which runs evenly in pixels from 0 at the ray's start to 1 at its end: 1 / d is linear
-// in s.
-float t_at(Ray ray, float s) {
-    float d0 = -ray.origin.z, d1 = d0 - ray.reach * ray.dir.z;
-    return ray.reach * s * d0 / mix(d1, d0, s);
-}
-
 // A ray on the screen: pixel positions and 1 / d at its ends.
 struct ScreenLine {
     vec2 start;
@@ -30,6 +23,10 @@ ScreenLine screen_line(Ray ray) {
 }
 
 float depth_at(ScreenLine line, float s) { return 1.0 / mix(line.inverse_start, line.inverse_end, s); }
+
+// t at a screen-space parameter s, which runs evenly in pixels from 0 at the ray's start to 1 at its end: 1 / d is linear
+// in s.
+float t_at(Ray ray, ScreenLine line, float s) { return ray.reach * line.inverse_end * (s * depth_at(line, s)); }
 
 // The pixel that a line comes into at s: a nudge further on, because s lies on the edge between two.
 ivec2 pixel_after(ScreenLine line, float s, float nudge) {

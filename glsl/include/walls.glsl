@@ -46,9 +46,8 @@ Body body_at(vec2 position, float d) {
     vec2 a = walls_at(p.lo).xy, b = walls_at(ivec2(p.hi.x, p.lo.y)).xy, c = walls_at(ivec2(p.lo.x, p.hi.y)).xy,
          e = walls_at(p.hi).xy;
     vec2 low = min(min(a, b), min(c, e)), high = max(max(a, b), max(c, e));
-    ivec2 own_pixel = nearest(position);
     // The pixel that holds the position is one of the four.
-    bool right = own_pixel.x != p.lo.x, lower = own_pixel.y != p.lo.y;
+    bool right = p.weight.x >= 0.5, lower = p.weight.y >= 0.5;
     vec2 own = lower ? (right ? e : c) : (right ? b : a);
     bool all_there = low.y > 0.0;
     float jump = jump_at(d);
@@ -286,7 +285,7 @@ Wall body_wall(Ray ray, ScreenLine line, bool inside, float start, Bracket k) {
     vec2 inner = inside ? k.at_a : k.at_b, outer = inside ? k.at_b : k.at_a;
     bool at_inner = abs(g_of(inner)) <= accepted, surface = at_inner || abs(g_of(outer)) <= accepted;
     vec2 along = line.end - line.start;
-    Wall wall = Wall(t_at(ray, hit), vec3(0.0), CLASS_BODY, !surface, vec2(0.0), Ball(vec3(0.0), 0.0));
+    Wall wall = Wall(t_at(ray, line, hit), vec3(0.0), CLASS_BODY, !surface, vec2(0.0), Ball(vec3(0.0), 0.0));
     if (surface) {
         int which = side_of(g_of(outer) < HOLE ? outer : inner);
         // On the border between two pixels, that of the one whose depth is met.
@@ -298,7 +297,7 @@ Wall body_wall(Ray ray, ScreenLine line, bool inside, float start, Bracket k) {
         vec3 x = ray.origin + wall.t * ray.dir;
         wall.normal = side_normal(nearest(line.start + (inside ? k.a : k.b) * along), outer, x, inside ? along : -along);
         // Off the border between two pixels, so that a ray goes on from the one on its side.
-        vec2 ends = vec2(t_at(ray, max(k.a - SIDE_NUDGE * pixel, 0.0)), t_at(ray, min(k.b + SIDE_NUDGE * pixel, 1.0))) - wall.t;
+        vec2 ends = vec2(t_at(ray, line, max(k.a - SIDE_NUDGE * pixel, 0.0)), t_at(ray, line, min(k.b + SIDE_NUDGE * pixel, 1.0))) - wall.t;
         wall.beside = inside ? ends : ends.yx;
     }
     return wall;

@@ -159,6 +159,7 @@ bool go_on(inout Walk w, out Wall wall) {
             if (!inside && outcome == OUTCOME_HIT) found = OUTCOME_NO_LIQUID;
         }
     }
+    w.ball = wall.ball;
     float t = wall.t;
 #ifdef SCENE
     // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
@@ -177,7 +178,6 @@ bool go_on(inout Walk w, out Wall wall) {
     if (found != OUTCOME_HIT) return false;
     if (inside && handed_over(w, wall.cls)) return true;
     w.side = w.side || wall.side;
-    w.ball = wall.ball;
     return false;
 }
 
