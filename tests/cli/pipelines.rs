@@ -4,7 +4,7 @@ use crate::{Run, text};
 use serde_json::Value;
 use std::{collections::BTreeSet, path::Path};
 
-/// Shaders that keep fewer waves in flight than [`WAVES`] on the hardware below, the waves, and why that is so.
+/// Shaders that keep fewer waves in flight than [`WAVES`] on the hardware below, or have to keep more, the waves, and why that is so.
 const FEWER_WAVES: &str = include_str!("pipelines.txt");
 const WAVES: u32 = 16;
 const FAMILY: &str = "navi31";
