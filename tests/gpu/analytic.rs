@@ -267,14 +267,15 @@ fn tilted_planes_keep_depth_and_normal() {
     }
 }
 
-/// Imai16 Problem 1: a ball before a body. The ray leaves the ball by the ball's own back, then meets the body: four
-/// refractions.
+/// Imai16 Problem 1: a ball before a body, and another behind it on the same pixels, which are no one volume. The ray leaves the ball
+/// by the ball's own back, then meets the body: four refractions.
 #[test]
 fn a_ball_before_a_slab_is_left_by_its_own_back() {
     let ball = sphere(Vec3::new(0.1, 0.05, 0.7), 0.3);
+    let behind = sphere(Vec3::new(0.1, 0.05, -1.6), 0.3);
     let axes = Mat3::from_rotation_y(0.2) * Mat3::from_diagonal(Vec3::new(2.0, 2.0, 0.3));
     let body = Ellipsoid { center: Vec3::new(0.0, 0.0, -0.7), axes };
-    let case = case(0.3, &[ball], &[body], view(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, 45.0), settings(4, 0));
+    let case = case(0.3, &[ball, behind], &[body], view(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, 45.0), settings(4, 0));
     let (first, second) = (Quadric::new(&ball), Quadric::new(&body));
     each_driver(|driver| {
         let (mut angles, mut lengths) = (Vec::new(), Vec::new());

@@ -10,7 +10,7 @@ use crate::{
 use ash::vk;
 use glam::{DVec3, Mat3, Vec3};
 use meniscus::{
-    Background, Camera, Ellipsoid, EnvironmentInput, EnvironmentShape, FrameInput, SceneInput,
+    Background, Camera, Ellipsoid, EnvironmentInput, EnvironmentShape, FrameInput, Particles, SceneInput,
     host::{Canvas, Gpu},
     shader::{OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NO_LIQUID, OUTCOME_SCENE, WETTING_GAP},
     twin::{background::env_color, optics::fresnel},
@@ -307,6 +307,20 @@ fn random_scenes_are_met_as_the_twin_meets_them() {
             each_driver(|driver| crate::walk::compare_before(driver, &case, &painted, background));
         }
     }
+}
+
+/// A wall far behind a ball at the left of a wide picture: rays through its rim cross more than half of the columns.
+#[test]
+fn a_scene_is_met_across_a_wide_picture() {
+    let (size, half) = ([4000, 16], 0.0875f32);
+    let aspect = size[0] as f32 / size[1] as f32;
+    let camera =
+        Camera::look_at(Vec3::new(0.0, 0.0, 20.0), Vec3::ZERO, Vec3::Y, 2.0 * (half / aspect).atan(), aspect, 0.01);
+    let particles =
+        Particles { radius: 0.2, ellipsoids: vec![sphere(Vec3::new(-1.5, 0.0, 0.0), 0.2)], splash_count: 0 };
+    let case = crate::support::Case { particles, camera, settings: imai16().refractions(1), size, eye_inside: false };
+    let painted = painted(size, |_, _| 28.0);
+    each_driver(|driver| crate::walk::compare_before(driver, &case, &painted, Background::Environment));
 }
 
 /// Bytes of an output of one colour.

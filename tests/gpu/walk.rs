@@ -2,14 +2,14 @@
 
 use crate::{
     background::{HostScene, Painted},
-    support::{Case, Choose, Driver, SKY, Shot, camera, each_driver, imai16, random_cloud},
+    support::{Case, Choose, Driver, SKY, Shot, camera, each_driver, imai16, random_cloud, sphere},
 };
 use glam::{DVec3, Vec3};
 use meniscus::{
     Background, Equirect, Fresnel, Particles, Settings,
     shader::{
         Frame, OUTCOME_HIT, OUTCOME_LEFT_VIEW, OUTCOME_NOT_CONVERGED, OUTCOME_REFLECTION_LIMIT, OUTCOME_SCENE,
-        OUTCOME_SIDE_WALL, PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH_SPLASH,
+        OUTCOME_SIDE_WALL, PATTERN_BODY_SPLASH, PATTERN_NONE, PATTERN_SPLASH_SPLASH, SPLASH_RADIUS,
     },
     twin::{
         background::Scene,
@@ -327,6 +327,30 @@ fn random_clouds_are_walked_as_their_twin_walks_them() {
         }
         // Nothing reaches to the picture's edge.
         compare_outcomes(driver, &all, &[OUTCOME_HIT, OUTCOME_SIDE_WALL, OUTCOME_REFLECTION_LIMIT]);
+    });
+}
+
+/// A stray droplet far behind the liquid moves no threshold of the search, as it did where they went by the distance of the liquid's box:
+/// all that changes is where along longer rays the same walls are looked for.
+#[cfg(feature = "io")]
+#[test]
+fn a_stray_droplet_changes_little() {
+    let rest = Case { settings: optics(4, 4, Fresnel::Schlick, CLEAR), ..crate::splat::dam_break().clone() };
+    let mut stray = rest.clone();
+    let (low, high) = rest.particles.bounds().expect("particles");
+    let to_middle = 0.5 * (low + high) - rest.camera.view.inverse().w_axis.truncate();
+    let far = 0.5 * (low + high) + 4.0 * to_middle;
+    stray.particles.ellipsoids.insert(0, sphere(far, SPLASH_RADIUS * rest.particles.radius));
+    stray.particles.splash_count += 1;
+    each_driver(|driver| {
+        let [a, b] = [&rest, &stray].map(|case| driver.shoot(case));
+        let changed =
+            |(a, b): &(&[f32; 3], &[f32; 3])| (Vec3::from(**a) - Vec3::from(**b)).abs().max_element() > 8.0 / 255.0;
+        let liquid =
+            a.floats("walk (debug)", 0).unwrap().chunks_exact(4).filter(|w| w[0] as u32 != PATTERN_NONE).count();
+        let changed = a.picture.iter().zip(&b.picture).filter(changed).count();
+        println!("{}: {changed} of {liquid} pixels", driver.name);
+        assert!(liquid > 10_000 && 200 * changed <= liquid, "{}: {changed} of {liquid} pixels", driver.name);
     });
 }
 
