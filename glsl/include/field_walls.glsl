@@ -188,23 +188,20 @@ struct Course {
 };
 
 // Places among 4 x 4 x 4 cubes, in a byte each, and what a step adds to them; whoever has left them has set one of these bits.
-const uint AXIS_Y = 1u << 8, AXIS_Z = 1u << 16, BEYOND_FOUR = 0xfcfcfcu, BEYOND_ONE = 0xffffffu;
+const uint AXIS_Y = 1u << 8, AXIS_Z = 1u << 16, BEYOND = 0xfcfcfcu;
 
 // Which of the 64 is at a place.
 uint cube_number(uint place) { return (place | place >> 6 | place >> 12) & 63u; }
 
-// Takes a ray through a block or brick, by its first node and its span, from cube to cube of its 4 x 4 x 4, from its own on, until it comes to
-// one of those that `stops` has, by its number k, or leaves it; at once where `stops` has none. Says whether it came to one. Each step
+// Takes a ray through 4 x 4 x 4 cubes of an edge, a power of two so that no place is rounded, from the first one's first node on: from its
+// own cube until it comes to one of those that `stops` has, by its number k, or leaves them. Says whether it came to one. Each step
 // goes up or down one axis as the ray does, so that there are few, whatever its numbers are.
-bool cross_cubes(inout Course c, bool go, vec3 low, float span, uvec2 stops, out uint k, inout bool first) {
-    bool at_once = stops == uvec2(0u);
-    // Powers of two, so that no place is rounded.
-    float edge = at_once ? span : span / BRICK_EDGE, per_edge = at_once ? 1.0 / span : BRICK_EDGE / span;
-    uint beyond = at_once ? BEYOND_ONE : BEYOND_FOUR;
+bool cross_cubes(inout Course c, bool go, vec3 low, float edge, uvec2 stops, out uint k, inout bool first) {
+    float per_edge = 1.0 / edge;
     vec3 cube = edge * floor(c.cell * per_edge);
     vec3 next = (cube + edge * c.ahead - c.x) * c.per_dir, between = edge * abs(c.per_dir);
     uvec3 up = uvec3(1u, AXIS_Y, AXIS_Z), ways = mix(0u - up, up, greaterThan(c.ahead, vec3(0.0)));
-    uint begin = at_once ? 0u : uint(whole(dot((cube - low) * per_edge, vec3(1.0, float(AXIS_Y), float(AXIS_Z))))), place = begin;
+    uint begin = uint(whole(dot((cube - low) * per_edge, vec3(1.0, float(AXIS_Y), float(AXIS_Z))))), place = begin;
     float t = c.t;
     bool look = go && !field_bit(stops, cube_number(place));
     while (look) {
@@ -212,17 +209,17 @@ bool cross_cubes(inout Course c, bool go, vec3 low, float span, uvec2 stops, out
         t = is_x ? next.x : is_y ? next.y : next.z;
         place += is_x ? ways.x : is_y ? ways.y : ways.z;
         next += vec3(is_x ? between.x : 0.0, is_y ? between.y : 0.0, is_x || is_y ? 0.0 : between.z);
-        look = (place & beyond) == 0u && !field_bit(stops, cube_number(place));
+        look = (place & BEYOND) == 0u && !field_bit(stops, cube_number(place));
     }
     k = cube_number(place);
     if (place != begin) {
         uint above = place + (1u + AXIS_Y + AXIS_Z); // so that none is negative
-        cube = (at_once ? cube : low) + edge * (vec3(uvec3(above, above >> 8, above >> 16) & 0xffu) - 1.0);
+        cube = low + edge * (vec3(uvec3(above, above >> 8, above >> 16) & 0xffu) - 1.0);
         c.t = max(c.t, t);
         c.cell = clamp(floor(c.x + c.t * c.dir), cube, cube + (edge - 1.0));
         first = false;
     }
-    return go && (place & beyond) == 0u;
+    return go && (place & BEYOND) == 0u;
 }
 
 // `side` times the field less its level along a ray's way through the cell in which it is: at its beginning, after a third and two thirds, and at its
@@ -254,8 +251,12 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
         // On to a brick that holds the surface, from outside also to one into which balls reach; or to the next block.
         ++steps;
         look_up(block, c.cell);
+        uvec2 stops = inside ? block.surfaces : block.surfaces | block.balls;
+        // Through a block without any at once: as if it were the first of 4 x 4 x 4 blocks, which stop at every other.
+        bool through = stops == uvec2(0u);
+        if (through) stops = uvec2(~1u, ~0u);
         uint k;
-        bool stop = cross_cubes(c, true, block.low, BLOCK_EDGE, inside ? block.surfaces : block.surfaces | block.balls, k, first);
+        bool stop = cross_cubes(c, true, block.low, through ? BLOCK_EDGE : BRICK_EDGE, stops, k, first) && !through;
         uvec4 words = stop ? brick_words(block.first + field_before(block.there, k)) : uvec4(0u);
         uvec2 surface = stop && field_bit(block.surfaces, k) ? words.xy : uvec2(0u);
         vec3 brick = BRICK_EDGE * floor(c.cell / BRICK_EDGE);
@@ -264,7 +265,7 @@ Wall find_wall(inout Block block, vec3 x, vec3 dir, bool inside, float t, float 
         // In it from cell to cell of those that hold the surface: CPUs do without looking up block and brick each time.
         bool in_brick = true;
         while (in_brick) {
-            in_brick = cross_cubes(c, stop, brick, BRICK_EDGE, surface, k, first) && c.t < min(reach, wall.t);
+            in_brick = cross_cubes(c, stop, brick, 1.0, surface, k, first) && c.t < min(reach, wall.t);
             if (in_brick) {
                 cell = words[FIELD_FIRST_CELL] + field_before(surface, k);
                 own = own || !first;

@@ -14,7 +14,7 @@ use meniscus::{
     prepare::{Input, Options, Search, points},
     shader::{
         Frame, OUTCOME_HIT, OUTCOME_NO_LIQUID, OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED, OUTCOME_REFLECTION_LIMIT,
-        OUTCOME_SCENE, PATTERN_BODY, PATTERN_NONE, PATTERN_SPLASH, REFLECTION_LEAST, SPLASH_RADIUS,
+        OUTCOME_SCENE, PATTERN_BODY, PATTERN_BODY_BODY, PATTERN_NONE, PATTERN_SPLASH, REFLECTION_LEAST, SPLASH_RADIUS,
     },
     twin::{
         background::{Scene, env_color},
@@ -201,6 +201,30 @@ fn rays_are_walked_as_the_twin_walks_them() {
         );
         assert_eq!(count(&|w| [OUTCOME_NO_WALL, OUTCOME_NOT_CONVERGED].contains(&w.outcome)), 0, "{}", driver.name);
     });
+}
+
+/// A plate, and a larger one some empty blocks of the directory behind it, which rays cross up and down each axis.
+#[test]
+fn empty_blocks_are_crossed() {
+    let plate = |middle: Vec3, n: [i32; 3]| {
+        let at = move |i: i32| Vec3::new((i % n[0]) as f32, (i / n[0] % n[1]) as f32, (i / n[0] / n[1]) as f32);
+        let half = 0.5 * (Vec3::from(n.map(|n| n as f32)) - 1.0);
+        (0..n[0] * n[1] * n[2]).map(move |i| middle + 0.1 * (at(i) - half))
+    };
+    let along = Vec3::new(0.4, 0.3, 1.0).normalize();
+    for way in [1.0f32, -1.0] {
+        let behind = 6.0 * way * along;
+        let positions: Vec<Vec3> = plate(Vec3::ZERO, [12, 12, 3]).chain(plate(behind, [40, 36, 3])).collect();
+        let camera = camera(-2.5 * way * along, Vec3::ZERO, SIZE);
+        let settings = settings(Field::default(), "four").reflections(0);
+        let case = prepared(&positions, &Case { settings, camera, size: SIZE, ..crate::shape::empty(0.05) });
+        each_driver(|driver| {
+            let (shot, _) = crate::field::shoot(driver, &positions, &case);
+            let all = compare_shot(driver, &case, &shot, 7);
+            let both = all.iter().filter(|w| w.pattern == PATTERN_BODY_BODY).count();
+            assert!(both > 1000, "{}: {both} rays meet both", driver.name);
+        });
+    }
 }
 
 /// Followed reflections are the twin's, be there few of them or more than wait; the view ray's own walk stays what it was.
