@@ -159,7 +159,7 @@ bool go_on(inout Walk w, out Wall wall) {
             if (!inside && outcome == OUTCOME_HIT) found = OUTCOME_NO_LIQUID;
         }
     }
-    w.ball = wall.ball;
+    w.ball = wall.ball; // so that the last one needs no registers while a wall is looked for
     float t = wall.t;
 #ifdef SCENE
     // Where the scene stands in the liquid, or just beyond its wall, the liquid reaches up to it.
