@@ -4,8 +4,8 @@ use crate::{Run, text};
 use serde_json::Value;
 use std::{collections::BTreeSet, path::Path};
 
-/// Shaders that keep fewer waves in flight than [`WAVES`] on the hardware below, or have to keep more, the waves, and why that is so.
-const FEWER_WAVES: &str = include_str!("pipelines.txt");
+/// Shaders of which other waves than [`WAVES`] in flight are asked on the hardware below, the waves, and why.
+const OTHER_WAVES: &str = include_str!("pipelines.txt");
 const WAVES: u32 = 16;
 const FAMILY: &str = "navi31";
 /// Mesa 25's RADV, where setup.sh has found it; it compiles for hardware that is not there.
@@ -41,7 +41,7 @@ fn stages(figures: &Value) -> BTreeSet<(String, u32, u32)> {
 #[test]
 fn a_gpu_that_is_not_there_is_kept_busy() {
     let Some(manifest) = radv() else { return println!("no RADV of Mesa 25: nothing is compiled") };
-    let excused: Vec<(&str, u32)> = FEWER_WAVES
+    let others: Vec<(&str, u32)> = OTHER_WAVES
         .lines()
         .filter(|line| !line.starts_with('#'))
         .map(|line| {
@@ -58,10 +58,10 @@ fn a_gpu_that_is_not_there_is_kept_busy() {
     assert!(found.len() > 40, "{found:?}");
     for (name, waves, spilled) in &found {
         assert_eq!(*spilled, 0, "{name}: bytes or registers that are spilled");
-        let least = excused.iter().find(|(shader, _)| shader == name).map_or(WAVES, |(_, waves)| *waves);
+        let least = others.iter().find(|(shader, _)| shader == name).map_or(WAVES, |(_, waves)| *waves);
         assert!(*waves >= least, "{name}: {waves} waves, {least} asked; tests/cli/pipelines.txt is for reasons");
     }
-    for (shader, least) in excused {
+    for (shader, least) in others {
         let fewest = found.iter().filter(|(name, ..)| name == shader).map(|(_, waves, _)| *waves).min();
         assert_eq!(fewest, Some(least), "{shader}: the table says {least}");
     }

@@ -309,7 +309,7 @@ fn random_scenes_are_met_as_the_twin_meets_them() {
     }
 }
 
-/// A wall far behind a ball at the left of a wide picture: rays through its rim cross more than half of the columns.
+/// A wall far behind a ball at the left of a wide picture: rays through its rim cross more than a thousand columns before they meet it.
 #[test]
 fn a_scene_is_met_across_a_wide_picture() {
     let (size, half) = ([4000, 16], 0.0875f32);

@@ -4,7 +4,7 @@ use crate::{
     analytic::{self, Pixel, pixels, snell},
     background::{HostScene, painted},
     field::{prepared, settings, words},
-    support::{Case, Choose, Cloud, Driver, Random, SKY, Shot, camera, each_driver},
+    support::{Case, Choose, Cloud, Driver, Random, SKY, Shot, camera, each_driver, lattice},
     walk::degrees,
 };
 use glam::{DVec3, Vec3};
@@ -206,11 +206,7 @@ fn rays_are_walked_as_the_twin_walks_them() {
 /// A plate, and a larger one some empty blocks of the directory behind it, which rays cross up and down each axis.
 #[test]
 fn empty_blocks_are_crossed() {
-    let plate = |middle: Vec3, n: [i32; 3]| {
-        let at = move |i: i32| Vec3::new((i % n[0]) as f32, (i / n[0] % n[1]) as f32, (i / n[0] / n[1]) as f32);
-        let half = 0.5 * (Vec3::from(n.map(|n| n as f32)) - 1.0);
-        (0..n[0] * n[1] * n[2]).map(move |i| middle + 0.1 * (at(i) - half))
-    };
+    let plate = |middle, n| lattice(middle, 0.05, n).into_iter().map(|particle| particle.center);
     let along = Vec3::new(0.4, 0.3, 1.0).normalize();
     for way in [1.0f32, -1.0] {
         let behind = 6.0 * way * along;
